@@ -1,0 +1,4 @@
+//! stub
+#![forbid(unsafe_code)]
+pub mod camera;
+pub use camera::Camera;

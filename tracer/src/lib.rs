@@ -1,0 +1,4 @@
+//! stub
+#![forbid(unsafe_code)]
+pub mod scene;
+pub use scene::{Light, Material, Mesh, Rgb, Scene};
