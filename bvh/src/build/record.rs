@@ -1,0 +1,80 @@
+//! The tree between building and layout: one record per child, the children of a node side by
+//! side.
+//!
+//! Invariant: below a range of n references there are at most 2n − 2 records, since every split
+//! adds one child and a leaf holds at least one reference. So each subtree owns a slice of the
+//! record array from the start, and threads never meet.
+
+use super::primitive::Bounds;
+
+/// What is behind a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// `first..first + count` of the leaf ids.
+    Leaf,
+    /// `first..first + count` of the records.
+    Inner,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Record {
+    pub(crate) lower: [f32; 3],
+    pub(crate) upper: [f32; 3],
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+    /// Inner nodes of the subtree, this one included.
+    pub(crate) nodes: u32,
+    /// Triangle blocks of the subtree.
+    pub(crate) blocks: u32,
+    pub(crate) kind: Kind,
+}
+
+impl Record {
+    pub(crate) const UNUSED: Self = Self {
+        lower: [0.0; 3],
+        upper: [0.0; 3],
+        first: 0,
+        count: 0,
+        nodes: 0,
+        blocks: 0,
+        kind: Kind::Leaf,
+    };
+
+    pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize, blocks: u32) -> Self {
+        Self {
+            first: first as u32,
+            count: count as u32,
+            nodes: 0,
+            blocks,
+            kind: Kind::Leaf,
+            ..Self::of(bounds)
+        }
+    }
+
+    pub(crate) fn inner(bounds: &Bounds, first: usize, children: &[Self]) -> Self {
+        Self {
+            first: first as u32,
+            count: children.len() as u32,
+            nodes: 1 + children.iter().map(|c| c.nodes).sum::<u32>(),
+            blocks: children.iter().map(|c| c.blocks).sum(),
+            kind: Kind::Inner,
+            ..Self::of(bounds)
+        }
+    }
+
+    fn of(bounds: &Bounds) -> Self {
+        let aabb = bounds.to_aabb();
+        Self {
+            lower: aabb.min.to_array(),
+            upper: aabb.max.to_array(),
+            ..Self::UNUSED
+        }
+    }
+
+    pub(crate) fn bounds(&self) -> crate::bounds::Aabb {
+        crate::bounds::Aabb {
+            min: self.lower.into(),
+            max: self.upper.into(),
+        }
+    }
+}

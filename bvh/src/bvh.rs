@@ -1,0 +1,283 @@
+//! The tree that a user holds: built over meshes, asked with rays.
+
+use glam::Vec3;
+
+use crate::{
+    bounds::Aabb,
+    build::{BuildWorkspace, primitive::PrimitiveRef, recursion},
+    error::BuildError,
+    layout::{emit, tree::Tree},
+    mesh::{MeshError, TriangleMesh},
+    params::BuildParams,
+    ray::{Hit, Ray, Work},
+    simd::{Isa, dispatch},
+    stats::TreeStats,
+    traverse::kernel::{Candidate, Count, RaySetup, power_of_two_below},
+};
+
+/// Largest coordinates outside this range are refused.
+const COORDINATE_MIN: f32 = 1.0 / (1u128 << 100) as f32;
+const COORDINATE_MAX: f32 = (1u128 << 100) as f32;
+
+/// A bounding volume hierarchy over triangles.
+///
+/// Which triangle a ray hits, and where, is a function of the ray and the meshes alone: no
+/// parameter of the build, no instruction set and no number of threads changes a bit of it. Equal
+/// distances are decided by the lowest geometry id, then by the lowest primitive id.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    tree: AnyTree,
+    /// Number of each mesh's first triangle over all meshes, and the total at the end.
+    first_ids: Vec<u32>,
+    /// Stored coordinates are those of the meshes times this power of two, so that the largest
+    /// lies in 1..2: no scene is too small or too large for the products of a triangle test.
+    scale: f32,
+    bounds: Aabb,
+    params: BuildParams,
+    isa: Isa,
+}
+
+#[derive(Clone, Debug)]
+enum AnyTree {
+    Two(Tree<2, 2>),
+    Four(Tree<4, 2>),
+    Eight(Tree<8, 8>),
+}
+
+impl Bvh {
+    /// Builds a tree over `meshes`; the place of a mesh in the slice is its geometry id. No mesh,
+    /// or none with triangles, is a tree that no ray hits.
+    ///
+    /// # Errors
+    /// [`BuildError`] if the parameters are not valid, `max_depth` is too small, coordinates are
+    /// outside 2⁻¹⁰⁰ … 2¹⁰⁰, or there are too many triangles.
+    pub fn build(meshes: &[&TriangleMesh], params: &BuildParams) -> Result<Self, BuildError> {
+        Self::build_in(meshes, params, &mut BuildWorkspace::default())
+    }
+
+    /// Builds a tree in the memory of an earlier build. With
+    /// [`Dynamics::Dynamic`](crate::Dynamics) the memory stays in the workspace for the next.
+    ///
+    /// # Errors
+    /// As [`Bvh::build`].
+    pub fn build_in(
+        meshes: &[&TriangleMesh],
+        params: &BuildParams,
+        workspace: &mut BuildWorkspace,
+    ) -> Result<Self, BuildError> {
+        params.validate().map_err(BuildError::Parameters)?;
+        let first_ids = first_ids(meshes)?;
+        let bounds = bounds_of(meshes);
+        let scale = scale_of(&bounds)?;
+        workspace.references.clear();
+        for (geometry_id, mesh) in meshes.iter().enumerate() {
+            workspace
+                .references
+                .extend((0..mesh.triangles().len() as u32).map(|primitive_id| {
+                    let bounds = corners_bounds(mesh.corners(primitive_id).map(|v| v * scale));
+                    PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
+                }));
+        }
+        let root = recursion::build(workspace, &first_ids, params)?;
+        let source = emit::Source {
+            records: &workspace.records,
+            leaf_ids: &workspace.leaf_ids,
+            corners: |id: u32| {
+                let (geometry_id, primitive_id) = locate(&first_ids, id);
+                meshes[geometry_id as usize]
+                    .corners(primitive_id)
+                    .map(|v| v * scale)
+            },
+        };
+        let mut tree = AnyTree::new(params.branching_factor);
+        match &mut tree {
+            AnyTree::Two(tree) => emit::emit(tree, root.as_ref(), &source),
+            AnyTree::Four(tree) => emit::emit(tree, root.as_ref(), &source),
+            AnyTree::Eight(tree) => emit::emit(tree, root.as_ref(), &source),
+        }
+        if params.dynamics == crate::Dynamics::Static {
+            *workspace = BuildWorkspace::default();
+        }
+        Ok(Self {
+            tree,
+            first_ids,
+            scale,
+            bounds,
+            params: *params,
+            isa: Isa::best(),
+        })
+    }
+
+    /// The same tree, traced by the kernels of another instruction set. `None` if this machine
+    /// does not have it.
+    #[must_use]
+    pub fn with_isa(self, isa: Isa) -> Option<Self> {
+        isa.is_available().then_some(Self { isa, ..self })
+    }
+
+    /// The closest hit of a ray. A ray that is not finite, has no direction or an empty interval
+    /// hits nothing.
+    #[must_use]
+    #[inline]
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_hit_counted(ray, &mut ())
+    }
+
+    /// The closest hit of a ray; adds what it took to `work`.
+    #[must_use]
+    pub fn closest_hit_with_work(&self, ray: &Ray, work: &mut Work) -> Option<Hit> {
+        self.closest_hit_counted(ray, work)
+    }
+
+    /// Whether a ray hits anything.
+    #[must_use]
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        self.any_hit_counted(ray, &mut ())
+    }
+
+    /// Whether a ray hits anything; adds what it took to `work`.
+    #[must_use]
+    pub fn any_hit_with_work(&self, ray: &Ray, work: &mut Work) -> bool {
+        self.any_hit_counted(ray, work)
+    }
+
+    /// The smallest box around all triangles; empty if there are none.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// What it was built with.
+    #[must_use]
+    pub fn params(&self) -> &BuildParams {
+        &self.params
+    }
+
+    /// Which instruction set traces it.
+    #[must_use]
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// Counts, depth, cost and bytes, found by walking through the tree.
+    #[must_use]
+    pub fn stats(&self) -> TreeStats {
+        match &self.tree {
+            AnyTree::Two(tree) => TreeStats::of(tree, &self.params),
+            AnyTree::Four(tree) => TreeStats::of(tree, &self.params),
+            AnyTree::Eight(tree) => TreeStats::of(tree, &self.params),
+        }
+    }
+
+    #[inline]
+    fn closest_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> Option<Hit> {
+        let setup = RaySetup::new(ray, self.scale)?;
+        let candidate = match &self.tree {
+            AnyTree::Two(tree) => dispatch::closest(self.isa, tree, &setup, count),
+            AnyTree::Four(tree) => dispatch::closest(self.isa, tree, &setup, count),
+            AnyTree::Eight(tree) => dispatch::closest(self.isa, tree, &setup, count),
+        }?;
+        Some(hit_of(&candidate, &setup, &self.first_ids))
+    }
+
+    #[inline]
+    fn any_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> bool {
+        let Some(setup) = RaySetup::new(ray, self.scale) else {
+            return false;
+        };
+        match &self.tree {
+            AnyTree::Two(tree) => dispatch::any(self.isa, tree, &setup, count),
+            AnyTree::Four(tree) => dispatch::any(self.isa, tree, &setup, count),
+            AnyTree::Eight(tree) => dispatch::any(self.isa, tree, &setup, count),
+        }
+    }
+}
+
+impl AnyTree {
+    /// An empty tree of a branching factor that has been validated.
+    fn new(branching_factor: u32) -> Self {
+        match branching_factor {
+            2 => Self::Two(Tree::default()),
+            4 => Self::Four(Tree::default()),
+            _ => Self::Eight(Tree::default()),
+        }
+    }
+}
+
+/// The hit in the caller's units and ids.
+#[inline]
+pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32]) -> Hit {
+    let (geometry_id, primitive_id) = locate(first_ids, candidate.id);
+    Hit {
+        t: setup.unscaled(candidate.t),
+        u: candidate.u,
+        v: candidate.v,
+        geometry_id,
+        primitive_id,
+    }
+}
+
+/// The number of each mesh's first triangle over all meshes, and the total at the end.
+pub(crate) fn first_ids(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, MeshError> {
+    let count: usize = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+    if count > TriangleMesh::MAX_TRIANGLES {
+        return Err(MeshError::TooManyTriangles {
+            count,
+            limit: TriangleMesh::MAX_TRIANGLES,
+        });
+    }
+    let mut next = 0;
+    let mut first_ids = Vec::with_capacity(meshes.len() + 1);
+    for mesh in meshes {
+        first_ids.push(next);
+        next += mesh.triangles().len() as u32;
+    }
+    first_ids.push(next);
+    Ok(first_ids)
+}
+
+/// Geometry id and primitive id of a triangle, by its number over all meshes.
+#[inline]
+fn locate(first_ids: &[u32], id: u32) -> (u32, u32) {
+    // The last mesh that begins at or before it: empty meshes begin where the next one does.
+    let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
+    (geometry_id as u32, id - first_ids[geometry_id])
+}
+
+pub(crate) fn bounds_of(meshes: &[&TriangleMesh]) -> Aabb {
+    let corners = meshes.iter().flat_map(|mesh| {
+        mesh.triangles()
+            .iter()
+            .flatten()
+            .map(|&index| mesh.vertices()[index as usize])
+    });
+    corners.fold(Aabb::EMPTY, Aabb::extended_by)
+}
+
+fn corners_bounds([a, b, c]: [Vec3; 3]) -> Aabb {
+    Aabb {
+        min: a.min(b).min(c),
+        max: a.max(b).max(c),
+    }
+}
+
+/// The power of two that brings the largest coordinate into 1..2; 1 if there is none but 0.
+pub(crate) fn scale_of(bounds: &Aabb) -> Result<f32, BuildError> {
+    let largest = if bounds.is_empty() {
+        0.0
+    } else {
+        bounds.min.abs().max(bounds.max.abs()).max_element()
+    };
+    if largest == 0.0 {
+        return Ok(1.0);
+    }
+    if !(COORDINATE_MIN..=COORDINATE_MAX).contains(&largest) {
+        return Err(BuildError::CoordinateRange {
+            largest,
+            min: COORDINATE_MIN,
+            max: COORDINATE_MAX,
+        });
+    }
+    Ok(power_of_two_below(largest).recip())
+}

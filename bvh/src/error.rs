@@ -1,0 +1,97 @@
+//! What can be wrong with parameters and with a build. Fields, not text, so that a caller can act.
+
+use crate::mesh::MeshError;
+use crate::params::ParameterRange;
+
+/// What is wrong with one parameter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParameterFault {
+    /// A number outside its range, or not a number.
+    #[error("{name} = {value} is outside {min}..={max}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest value allowed.
+        min: f64,
+        /// Largest value allowed.
+        max: f64,
+    },
+    /// A whole number that is none of those allowed.
+    #[error("{name} = {value} is none of {allowed:?}")]
+    NotOneOf {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: u32,
+        /// The values allowed.
+        allowed: &'static [u32],
+    },
+    /// A value with a meaning that this version does not build yet.
+    #[error("{name} = {value} is not built yet; built are {built:?}")]
+    NotBuiltYet {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: &'static str,
+        /// The values that are built.
+        built: &'static [&'static str],
+    },
+    /// Text that is no value of the parameter.
+    #[error("{name} = {text:?} is not understood; allowed are {allowed:?}")]
+    NotUnderstood {
+        /// The parameter.
+        name: &'static str,
+        /// The text given.
+        text: String,
+        /// The values allowed.
+        allowed: ParameterRange,
+    },
+    /// No parameter has this name.
+    #[error("there is no parameter {name:?}")]
+    UnknownName {
+        /// The name given.
+        name: String,
+    },
+}
+
+/// Why no tree was built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// Parameters that cannot be built: all of them.
+    #[error("{}", join(.0))]
+    Parameters(Vec<ParameterFault>),
+    /// The tree would need more levels than `max_depth` allows.
+    #[error("max_depth = {max_depth} is too small: at least {needed} levels are needed")]
+    DepthLimit {
+        /// The limit given.
+        max_depth: u32,
+        /// A limit below which the build surely fails.
+        needed: u32,
+    },
+    /// Coordinates whose largest magnitude is so large or so small that products of two of them
+    /// leave the range of `f32` even after scaling.
+    #[error("largest coordinate {largest:e} is outside {min:e}..={max:e}")]
+    CoordinateRange {
+        /// The largest magnitude of a coordinate.
+        largest: f32,
+        /// Smallest magnitude allowed.
+        min: f32,
+        /// Largest magnitude allowed.
+        max: f32,
+    },
+    /// A mesh that cannot be numbered.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+fn join(faults: &[ParameterFault]) -> String {
+    faults
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join("; ")
+}

@@ -1,0 +1,6 @@
+//! How a tree lies in memory.
+
+pub(crate) mod emit;
+pub(crate) mod node;
+pub(crate) mod tree;
+pub(crate) mod triangles;

@@ -1,0 +1,225 @@
+//! A node with N children, and the references that lead to them.
+//!
+//! The boxes of the children lie axis by axis, so that one load fetches a plane of all children;
+//! the order in which a ray should visit them is stored for each octant of directions, which
+//! costs only the padding to a cache line. After Fuetterling, Lojewski, Pfreundt, Hamann, Ebert,
+//! *Accelerated Single Ray Tracing for Wide Vector Units*, 2017 (order by octant), and Nah,
+//! Manocha, *SATO: Surface Area Traversal Order for Shadow Ray Tracing*, 2014 (slots by area).
+//!
+//! Bytes: 64 for 2 children, 128 for 4, 256 for 8.
+
+use crate::bounds::Aabb;
+
+/// Where a child is: an inner node or a leaf.
+///
+/// Bit 31 tells a leaf. A leaf has its number of triangle blocks less one in bits 28 to 30 and its
+/// first block in bits 0 to 27; an inner node has its index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ChildRef(pub(crate) u32);
+
+impl ChildRef {
+    const LEAF: u32 = 1 << 31;
+    const BLOCK_COUNT_SHIFT: u32 = 28;
+    /// The most blocks that a leaf can have.
+    pub(crate) const MAX_BLOCKS: u32 = 8;
+    /// How many blocks can be told apart.
+    pub(crate) const BLOCK_LIMIT: usize = 1 << Self::BLOCK_COUNT_SHIFT;
+
+    pub(crate) fn inner(node: u32) -> Self {
+        debug_assert_eq!(node & Self::LEAF, 0);
+        Self(node)
+    }
+
+    pub(crate) fn leaf(first_block: u32, blocks: u32) -> Self {
+        debug_assert!(
+            (1..=Self::MAX_BLOCKS).contains(&blocks) && (first_block as usize) < Self::BLOCK_LIMIT
+        );
+        Self(Self::LEAF | (blocks - 1) << Self::BLOCK_COUNT_SHIFT | first_block)
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    /// The range of blocks of a leaf.
+    #[inline(always)]
+    pub(crate) fn blocks(self) -> std::ops::Range<usize> {
+        let first = (self.0 as usize) & (Self::BLOCK_LIMIT - 1);
+        first..first + ((self.0 >> Self::BLOCK_COUNT_SHIFT) as usize & 7) + 1
+    }
+}
+
+/// A node with up to `N` children; `W` words hold their order for the eight octants.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node<const N: usize, const W: usize> {
+    /// min x, max x, min y, max y, min z, max z of each child. An empty slot has +∞ and −∞, which
+    /// no ray enters.
+    pub(crate) planes: [[f32; N]; 6],
+    /// [`ChildRef`] of each child, in ascending order of area.
+    pub(crate) children: [u32; N],
+    order: [u32; W],
+}
+
+impl<const N: usize, const W: usize> Default for Node<N, W> {
+    fn default() -> Self {
+        let mut planes = [[f32::INFINITY; N]; 6];
+        for axis in 0..3 {
+            planes[2 * axis + 1] = [f32::NEG_INFINITY; N];
+        }
+        Self {
+            planes,
+            children: [0; N],
+            order: [0; W],
+        }
+    }
+}
+
+impl<const N: usize, const W: usize> Node<N, W> {
+    /// Bits of the order of one octant: 32 for N = 8, 8 for N = 4 and 2.
+    const OCTANT_BITS: usize = 4 * W;
+    const SLOT_BITS: u32 = N.trailing_zeros();
+    /// The order that takes slots as they lie.
+    pub(crate) const SLOT_ORDER: u32 = {
+        let (mut order, mut slot) = (0, 0);
+        while slot < N as u32 {
+            order |= slot << (slot * Self::SLOT_BITS);
+            slot += 1;
+        }
+        order
+    };
+
+    /// The slots from the farthest to the nearest for rays of an octant: fields of log2(N) bits,
+    /// lowest first. Bit a of `octant` is set if the direction is negative along axis a.
+    #[inline(always)]
+    pub(crate) fn order(&self, octant: usize) -> u32 {
+        let bit = octant * Self::OCTANT_BITS;
+        self.order[bit / 32] >> (bit % 32)
+    }
+
+    /// Makes a node of boxes and references, which must come in ascending order of area.
+    pub(crate) fn new(children: &[(Aabb, ChildRef)]) -> Self {
+        let mut node = Self::default();
+        for (slot, (bounds, reference)) in children.iter().enumerate() {
+            for axis in 0..3 {
+                node.planes[2 * axis][slot] = bounds.min[axis];
+                node.planes[2 * axis + 1][slot] = bounds.max[axis];
+            }
+            node.children[slot] = reference.0;
+        }
+        let centres: [[f32; 3]; N] = std::array::from_fn(|slot| match children.get(slot) {
+            Some((bounds, _)) => (bounds.min + bounds.max).to_array(),
+            None => [0.0; 3],
+        });
+        // Opposite octants see the children in opposite order, so that four sorts serve eight.
+        for octant in 0..4 {
+            let sign = |axis: usize| if octant >> axis & 1 == 1 { -1.0 } else { 1.0 };
+            let mut slots: [u32; N] = std::array::from_fn(|slot| slot as u32);
+            let key = |slot: &u32| {
+                let c = centres[*slot as usize];
+                c[0] * sign(0) + c[1] * sign(1) + c[2] * sign(2)
+            };
+            // Insertion sort, farthest first: at most eight elements, and stable.
+            for i in 1..children.len() {
+                let mut at = i;
+                while at > 0 && key(&slots[at - 1]) < key(&slots[at]) {
+                    slots.swap(at - 1, at);
+                    at -= 1;
+                }
+            }
+            node.set_order(octant, &slots);
+            slots[..children.len()].reverse();
+            node.set_order(7 - octant, &slots);
+        }
+        node
+    }
+
+    fn set_order(&mut self, octant: usize, slots: &[u32; N]) {
+        let mut order = 0;
+        for (place, slot) in slots.iter().enumerate() {
+            order |= slot << (place as u32 * Self::SLOT_BITS);
+        }
+        let bit = octant * Self::OCTANT_BITS;
+        self.order[bit / 32] |= order << (bit % 32);
+    }
+
+    /// The box of a child; empty for an empty slot.
+    pub(crate) fn child_bounds(&self, slot: usize) -> Aabb {
+        let plane = |k: usize| self.planes[k][slot];
+        Aabb {
+            min: glam::Vec3::new(plane(0), plane(2), plane(4)),
+            max: glam::Vec3::new(plane(1), plane(3), plane(5)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn sizes_are_whole_cache_lines() {
+        assert_eq!(size_of::<Node<2, 2>>(), 64);
+        assert_eq!(size_of::<Node<4, 2>>(), 128);
+        assert_eq!(size_of::<Node<8, 8>>(), 256);
+    }
+
+    fn order_is_a_permutation_from_far_to_near<const N: usize, const W: usize>() {
+        let boxes: Vec<_> = (0..N)
+            .map(|i| {
+                let centre = Vec3::new(
+                    (i * 37 % 11) as f32,
+                    (i * 53 % 7) as f32,
+                    (i * 29 % 5) as f32,
+                );
+                (
+                    Aabb {
+                        min: centre - 0.5,
+                        max: centre + 0.5,
+                    },
+                    ChildRef::inner(i as u32),
+                )
+            })
+            .collect();
+        let node = Node::<N, W>::new(&boxes);
+        for octant in 0..8 {
+            let direction = Vec3::from_array(std::array::from_fn(|a| {
+                if octant >> a & 1 == 1 { -1.0 } else { 1.0 }
+            }));
+            let slots: Vec<usize> = (0..N)
+                .map(|k| (node.order(octant) >> (k as u32 * N.trailing_zeros())) as usize & (N - 1))
+                .collect();
+            let mut seen = slots.clone();
+            seen.sort_unstable();
+            assert_eq!(seen, (0..N).collect::<Vec<_>>());
+            let keys: Vec<f32> = slots
+                .iter()
+                .map(|&s| boxes[s].0.centre().dot(direction))
+                .collect();
+            assert!(
+                keys.is_sorted_by(|a, b| a >= b),
+                "octant {octant}: {keys:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn order_for_every_width() {
+        order_is_a_permutation_from_far_to_near::<2, 2>();
+        order_is_a_permutation_from_far_to_near::<4, 2>();
+        order_is_a_permutation_from_far_to_near::<8, 8>();
+    }
+
+    #[test]
+    fn references_keep_what_they_are_given() {
+        for (first, blocks) in [(0, 1), (12345, 8), ((1 << 28) - 1, 3)] {
+            let leaf = ChildRef::leaf(first, blocks);
+            assert!(leaf.is_leaf());
+            assert_eq!(leaf.blocks(), first as usize..(first + blocks) as usize);
+        }
+        assert!(!ChildRef::inner(7).is_leaf());
+    }
+}

@@ -1,0 +1,28 @@
+//! A tree as the kernels read it.
+
+use super::{
+    node::{ChildRef, Node},
+    triangles::TriangleBlock,
+};
+
+/// Nodes depth first, the root first; an empty scene has no node. Coordinates are scaled by the
+/// power of two that the tree's owner keeps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tree<const N: usize, const W: usize> {
+    pub(crate) nodes: Vec<Node<N, W>>,
+    pub(crate) blocks: Vec<TriangleBlock>,
+}
+
+impl<const N: usize, const W: usize> Tree<N, W> {
+    /// The children in use of a node, with their slots.
+    pub(crate) fn children(&self, node: u32) -> impl Iterator<Item = (usize, ChildRef)> {
+        let node = &self.nodes[node as usize];
+        (0..N)
+            .filter(|&slot| !node.child_bounds(slot).is_empty())
+            .map(|slot| (slot, ChildRef(node.children[slot])))
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+    }
+}

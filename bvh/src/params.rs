@@ -1,0 +1,525 @@
+//! The parameter space of a tree: eleven parameters with the meaning that they have in Embree's
+//! `RTCBuildArguments` and scene flags, after Table 1 of Herveau, Pfaffe, Tillmann, Tichy,
+//! Dachsbacher, *Analysis of Acceleration Structure Parameters and Hybrid Autotuning for Ray
+//! Tracing*.
+//!
+//! [`PARAMETERS`] is the one table of names, ranges and meanings: validation, command line and
+//! tuner read it. Invariant: a value that has no meaning here, or none yet, is an error; no value
+//! is ever ignored.
+
+use crate::error::ParameterFault;
+
+/// How primitives are divided into subtrees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quality {
+    /// Along a Morton curve: fast to build, slow to trace. Not built yet.
+    Morton,
+    /// Binned surface area heuristic.
+    BinnedSah,
+    /// Binned surface area heuristic that may cut primitives in two. Not built yet.
+    SpatialSplits,
+}
+
+/// What a [`BuildWorkspace`](crate::BuildWorkspace) keeps for the next build.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dynamics {
+    /// The temporary memory is kept: the tree will be built again soon.
+    Dynamic,
+    /// The temporary memory is freed after the build (the paper's flag `static`).
+    Static,
+}
+
+/// How a leaf stores its triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LeafFormat {
+    /// One vertex and two edges of each triangle, ready for the intersection test.
+    Edges,
+    /// Vertex indices only: less memory, more work (the paper's flag `compact`). Not built yet.
+    Compact,
+}
+
+/// Which triangle test is used. This is a choice of accuracy, not of speed alone: it can change
+/// which primitive is hit at an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Accuracy {
+    /// Möller–Trumbore on stored edges; a ray that meets a shared edge exactly may slip through.
+    Fast,
+    /// Watertight (the paper's flag `robust`). Not built yet.
+    Robust,
+}
+
+/// The value of one parameter, whatever its kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ParameterValue {
+    /// A whole number.
+    Integer(u32),
+    /// A real number.
+    Real(f32),
+    /// One of a list of words.
+    Choice(&'static str),
+}
+
+impl std::fmt::Display for ParameterValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Integer(v) => write!(f, "{v}"),
+            Self::Real(v) => write!(f, "{v}"),
+            Self::Choice(v) => f.write_str(v),
+        }
+    }
+}
+
+/// Which values a parameter may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ParameterRange {
+    /// All whole numbers from the first to the second, both included.
+    Integers(u32, u32),
+    /// Some whole numbers.
+    OneOf(&'static [u32]),
+    /// All finite reals from the first to the second, both included.
+    Reals(f32, f32),
+    /// Words; the second list names those that are built today.
+    Words(&'static [&'static str], &'static [&'static str]),
+}
+
+/// One row of the parameter table.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// The name: a field of [`BuildParams`].
+    pub name: &'static str,
+    /// The values that are allowed.
+    pub range: ParameterRange,
+    /// The values that a tuner searches: the range of the paper's Table 1 where it gives one.
+    pub tuned: ParameterRange,
+    /// Whether it changes what is hit and not only how fast; a tuner leaves such a parameter alone.
+    pub changes_hits: bool,
+    /// One sentence of meaning.
+    pub meaning: &'static str,
+}
+
+const COST_LIMIT: f32 = 1000.0;
+
+/// The eleven parameters, in the order of the paper's Table 1.
+pub const PARAMETERS: [Parameter; 11] = [
+    Parameter {
+        name: "quality",
+        range: ParameterRange::Words(&["morton", "binned-sah", "spatial-splits"], &["binned-sah"]),
+        tuned: ParameterRange::Words(&["morton", "binned-sah", "spatial-splits"], &["binned-sah"]),
+        changes_hits: false,
+        meaning: "how primitives are divided into subtrees",
+    },
+    Parameter {
+        name: "branching_factor",
+        range: ParameterRange::OneOf(&[2, 4, 8]),
+        tuned: ParameterRange::OneOf(&[2, 4, 8]),
+        changes_hits: false,
+        meaning: "most children of a node",
+    },
+    Parameter {
+        name: "max_depth",
+        range: ParameterRange::Integers(1, 64),
+        tuned: ParameterRange::Integers(8, 64),
+        changes_hits: false,
+        meaning: "deepest level, the root being level 1; the last 8 levels halve without a heuristic",
+    },
+    Parameter {
+        name: "sah_block_size",
+        range: ParameterRange::Integers(1, 32),
+        tuned: ParameterRange::Integers(1, 32),
+        changes_hits: false,
+        meaning: "primitives that the cost model intersects at once; acts as the power of two below",
+    },
+    Parameter {
+        name: "min_leaf_size",
+        range: ParameterRange::Integers(1, 32),
+        tuned: ParameterRange::Integers(1, 32),
+        changes_hits: false,
+        meaning: "so few primitives are never divided; at most max_leaf_size",
+    },
+    Parameter {
+        name: "max_leaf_size",
+        range: ParameterRange::Integers(1, 32),
+        tuned: ParameterRange::Integers(1, 32),
+        changes_hits: false,
+        meaning: "more primitives are always divided",
+    },
+    Parameter {
+        name: "traversal_cost",
+        range: ParameterRange::Reals(0.0, COST_LIMIT),
+        tuned: ParameterRange::Reals(0.0, 10.0),
+        changes_hits: false,
+        meaning: "cost of visiting a node in the cost model",
+    },
+    Parameter {
+        name: "intersection_cost",
+        range: ParameterRange::Reals(0.0, COST_LIMIT),
+        tuned: ParameterRange::Reals(0.0, 10.0),
+        changes_hits: false,
+        meaning: "cost of intersecting a block of primitives in the cost model",
+    },
+    Parameter {
+        name: "dynamics",
+        range: ParameterRange::Words(&["dynamic", "static"], &["dynamic", "static"]),
+        tuned: ParameterRange::Words(&["dynamic", "static"], &["dynamic", "static"]),
+        changes_hits: false,
+        meaning: "dynamic keeps the temporary memory of a build for the next one",
+    },
+    Parameter {
+        name: "leaf_format",
+        range: ParameterRange::Words(&["edges", "compact"], &["edges"]),
+        tuned: ParameterRange::Words(&["edges", "compact"], &["edges"]),
+        changes_hits: false,
+        meaning: "compact stores vertex indices in place of edges",
+    },
+    Parameter {
+        name: "accuracy",
+        range: ParameterRange::Words(&["fast", "robust"], &["fast"]),
+        tuned: ParameterRange::Words(&["fast", "robust"], &["fast"]),
+        changes_hits: true,
+        meaning: "robust is watertight at edges and vertices",
+    },
+];
+
+/// What a tree is built with. Every combination of values either has a documented meaning or is an
+/// error of [`BuildParams::validate`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct BuildParams {
+    /// How primitives are divided into subtrees.
+    pub quality: Quality,
+    /// Most children of a node: 2, 4 or 8.
+    pub branching_factor: u32,
+    /// Deepest level of the tree, the root being level 1; 1..=64. The last 8 levels are a reserve
+    /// in which ranges are halved without looking at costs.
+    pub max_depth: u32,
+    /// Primitives that the cost model intersects at once, 1..=32; acts as the power of two below.
+    pub sah_block_size: u32,
+    /// Ranges of so few primitives become leaves, 1..=32. Acts as at most `max_leaf_size`.
+    pub min_leaf_size: u32,
+    /// Ranges of more primitives never become leaves, 1..=32.
+    pub max_leaf_size: u32,
+    /// Cost of visiting a node, in the unit of `intersection_cost`; 0..=1000.
+    pub traversal_cost: f32,
+    /// Cost of intersecting a block of primitives; 0..=1000.
+    pub intersection_cost: f32,
+    /// What the workspace keeps for the next build.
+    pub dynamics: Dynamics,
+    /// How a leaf stores its triangles.
+    pub leaf_format: LeafFormat,
+    /// Which triangle test is used.
+    pub accuracy: Accuracy,
+}
+
+impl Default for BuildParams {
+    /// [`BuildParams::embree_scene_medium`].
+    fn default() -> Self {
+        Self::embree_scene_medium()
+    }
+}
+
+impl BuildParams {
+    /// The defaults of Embree's builder interface (`rtcDefaultBuildArguments`), which are the
+    /// default column of the paper's Table 1. A weak baseline: binary nodes, leaves by cost alone.
+    #[must_use]
+    pub const fn embree_api_default() -> Self {
+        Self {
+            quality: Quality::BinnedSah,
+            branching_factor: 2,
+            max_depth: 32,
+            sah_block_size: 1,
+            min_leaf_size: 1,
+            max_leaf_size: 32,
+            traversal_cost: 1.0,
+            intersection_cost: 1.0,
+            dynamics: Dynamics::Dynamic,
+            leaf_format: LeafFormat::Edges,
+            accuracy: Accuracy::Fast,
+        }
+    }
+
+    /// What Embree 4 itself uses for a scene of medium quality on a machine with AVX: the strong
+    /// baseline.
+    #[must_use]
+    pub const fn embree_scene_medium() -> Self {
+        Self {
+            branching_factor: 8,
+            max_depth: 40,
+            sah_block_size: 4,
+            min_leaf_size: 4,
+            max_leaf_size: 28,
+            ..Self::embree_api_default()
+        }
+    }
+
+    /// All that is wrong with the values; an empty list means that they can be built.
+    #[must_use]
+    pub fn faults(&self) -> Vec<ParameterFault> {
+        PARAMETERS
+            .iter()
+            .filter_map(|p| fault_of(p, self.get(p.name)?))
+            .collect()
+    }
+
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// All faults, not only the first.
+    pub fn validate(&self) -> Result<(), Vec<ParameterFault>> {
+        let faults = self.faults();
+        if faults.is_empty() {
+            Ok(())
+        } else {
+            Err(faults)
+        }
+    }
+
+    /// The value of the parameter called `name`; `None` if there is none.
+    #[must_use]
+    pub fn get(&self, name: &str) -> Option<ParameterValue> {
+        use ParameterValue::{Choice, Integer, Real};
+        Some(match name {
+            "quality" => Choice(match self.quality {
+                Quality::Morton => "morton",
+                Quality::BinnedSah => "binned-sah",
+                Quality::SpatialSplits => "spatial-splits",
+            }),
+            "branching_factor" => Integer(self.branching_factor),
+            "max_depth" => Integer(self.max_depth),
+            "sah_block_size" => Integer(self.sah_block_size),
+            "min_leaf_size" => Integer(self.min_leaf_size),
+            "max_leaf_size" => Integer(self.max_leaf_size),
+            "traversal_cost" => Real(self.traversal_cost),
+            "intersection_cost" => Real(self.intersection_cost),
+            "dynamics" => Choice(match self.dynamics {
+                Dynamics::Dynamic => "dynamic",
+                Dynamics::Static => "static",
+            }),
+            "leaf_format" => Choice(match self.leaf_format {
+                LeafFormat::Edges => "edges",
+                LeafFormat::Compact => "compact",
+            }),
+            "accuracy" => Choice(match self.accuracy {
+                Accuracy::Fast => "fast",
+                Accuracy::Robust => "robust",
+            }),
+            _ => return None,
+        })
+    }
+
+    /// Sets the parameter called `name` from text, as a command line gives it.
+    ///
+    /// # Errors
+    /// [`ParameterFault::UnknownName`] or [`ParameterFault::NotUnderstood`]. Whether a number lies
+    /// in its range is left to [`BuildParams::validate`].
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), ParameterFault> {
+        let Some(parameter) = PARAMETERS.iter().find(|p| p.name == name) else {
+            return Err(ParameterFault::UnknownName {
+                name: name.to_owned(),
+            });
+        };
+        let not_understood = || ParameterFault::NotUnderstood {
+            name: parameter.name,
+            text: text.to_owned(),
+            allowed: parameter.range,
+        };
+        let integer = || text.parse::<u32>().map_err(|_| not_understood());
+        let real = || text.parse::<f32>().map_err(|_| not_understood());
+        match name {
+            "quality" => {
+                self.quality = match text {
+                    "morton" => Quality::Morton,
+                    "binned-sah" => Quality::BinnedSah,
+                    "spatial-splits" => Quality::SpatialSplits,
+                    _ => return Err(not_understood()),
+                }
+            }
+            "branching_factor" => self.branching_factor = integer()?,
+            "max_depth" => self.max_depth = integer()?,
+            "sah_block_size" => self.sah_block_size = integer()?,
+            "min_leaf_size" => self.min_leaf_size = integer()?,
+            "max_leaf_size" => self.max_leaf_size = integer()?,
+            "traversal_cost" => self.traversal_cost = real()?,
+            "intersection_cost" => self.intersection_cost = real()?,
+            "dynamics" => {
+                self.dynamics = match text {
+                    "dynamic" => Dynamics::Dynamic,
+                    "static" => Dynamics::Static,
+                    _ => return Err(not_understood()),
+                }
+            }
+            "leaf_format" => {
+                self.leaf_format = match text {
+                    "edges" => LeafFormat::Edges,
+                    "compact" => LeafFormat::Compact,
+                    _ => return Err(not_understood()),
+                }
+            }
+            "accuracy" => {
+                self.accuracy = match text {
+                    "fast" => Accuracy::Fast,
+                    "robust" => Accuracy::Robust,
+                    _ => return Err(not_understood()),
+                }
+            }
+            _ => unreachable!("every name of the table has an arm"),
+        }
+        Ok(())
+    }
+
+    /// The representative of all values that build the same tree: the smaller leaf limit capped by
+    /// the larger, the block size rounded down to a power of two, and both costs divided by the
+    /// power of two that brings the intersection cost into 1..2 (exact in binary arithmetic; an
+    /// intersection cost of 0 leaves the traversal cost alone).
+    #[must_use]
+    pub fn canonical(&self) -> Self {
+        let scale = match self.intersection_cost {
+            c if c.is_normal() => 2f32.powi(-(exponent(c))),
+            _ => 1.0,
+        };
+        Self {
+            sah_block_size: 1 << self.sah_block_shift(),
+            min_leaf_size: self.min_leaf_size.min(self.max_leaf_size),
+            traversal_cost: self.traversal_cost * scale,
+            intersection_cost: self.intersection_cost * scale,
+            ..*self
+        }
+    }
+
+    /// The shift that rounds a count up to blocks: ⌊log2 `sah_block_size`⌋.
+    pub(crate) fn sah_block_shift(&self) -> u32 {
+        self.sah_block_size.max(1).ilog2()
+    }
+}
+
+/// The exponent e of a normal number in 2^e · [1, 2).
+fn exponent(value: f32) -> i32 {
+    ((value.to_bits() >> 23) & 0xff) as i32 - 127
+}
+
+fn fault_of(parameter: &Parameter, value: ParameterValue) -> Option<ParameterFault> {
+    let name = parameter.name;
+    match (parameter.range, value) {
+        (ParameterRange::Integers(min, max), ParameterValue::Integer(v)) if v < min || v > max => {
+            Some(ParameterFault::OutOfRange {
+                name,
+                value: f64::from(v),
+                min: f64::from(min),
+                max: f64::from(max),
+            })
+        }
+        // Written so that NaN is a fault.
+        (ParameterRange::Reals(min, max), ParameterValue::Real(v)) if !(v >= min && v <= max) => {
+            Some(ParameterFault::OutOfRange {
+                name,
+                value: f64::from(v),
+                min: f64::from(min),
+                max: f64::from(max),
+            })
+        }
+        (ParameterRange::OneOf(allowed), ParameterValue::Integer(v)) if !allowed.contains(&v) => {
+            Some(ParameterFault::NotOneOf {
+                name,
+                value: v,
+                allowed,
+            })
+        }
+        (ParameterRange::Words(_, built), ParameterValue::Choice(word))
+            if !built.contains(&word) =>
+        {
+            Some(ParameterFault::NotBuiltYet {
+                name,
+                value: word,
+                built,
+            })
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_valid_and_the_table_knows_every_parameter() {
+        for params in [
+            BuildParams::embree_api_default(),
+            BuildParams::embree_scene_medium(),
+        ] {
+            assert_eq!(params.validate(), Ok(()));
+            for parameter in &PARAMETERS {
+                assert!(params.get(parameter.name).is_some(), "{}", parameter.name);
+            }
+        }
+    }
+
+    #[test]
+    fn set_reads_back_what_get_shows() {
+        let mut copy = BuildParams::embree_scene_medium();
+        let original = BuildParams {
+            quality: Quality::Morton,
+            traversal_cost: 0.1,
+            leaf_format: LeafFormat::Compact,
+            accuracy: Accuracy::Robust,
+            dynamics: Dynamics::Static,
+            ..BuildParams::embree_api_default()
+        };
+        for parameter in &PARAMETERS {
+            let text = original.get(parameter.name).expect("known").to_string();
+            copy.set(parameter.name, &text).expect("valid");
+        }
+        assert_eq!(copy, original);
+    }
+
+    #[test]
+    fn all_faults_are_reported_at_once() {
+        let params = BuildParams {
+            quality: Quality::Morton,
+            branching_factor: 3,
+            max_depth: 0,
+            sah_block_size: 0,
+            min_leaf_size: 0,
+            max_leaf_size: 33,
+            traversal_cost: f32::NAN,
+            intersection_cost: -1.0,
+            leaf_format: LeafFormat::Compact,
+            accuracy: Accuracy::Robust,
+            ..BuildParams::default()
+        };
+        assert_eq!(params.faults().len(), 10);
+    }
+
+    #[test]
+    fn what_is_not_built_yet_is_named() {
+        let params = BuildParams {
+            quality: Quality::SpatialSplits,
+            ..BuildParams::default()
+        };
+        assert!(matches!(
+            params.faults()[..],
+            [ParameterFault::NotBuiltYet {
+                name: "quality",
+                value: "spatial-splits",
+                ..
+            }]
+        ));
+    }
+
+    #[test]
+    fn canonical_is_idempotent_and_exact() {
+        let params = BuildParams {
+            sah_block_size: 7,
+            min_leaf_size: 9,
+            max_leaf_size: 5,
+            traversal_cost: 0.3,
+            intersection_cost: 5.5,
+            ..BuildParams::default()
+        };
+        let canonical = params.canonical();
+        assert_eq!(canonical.canonical(), canonical);
+        assert_eq!(canonical.sah_block_size, 4);
+        assert_eq!(canonical.min_leaf_size, 5);
+        assert_eq!(canonical.intersection_cost, 1.375);
+        assert_eq!(canonical.traversal_cost, 0.075);
+    }
+}

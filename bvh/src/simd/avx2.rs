@@ -1,0 +1,226 @@
+//! Lanes by AVX2 and FMA intrinsics.
+//!
+//! Invariant of the whole file: a value of [`F32x4`] or [`F32x8`] exists only inside the kernels
+//! that `dispatch` enters after [`Isa::Avx2`](super::Isa) was found to be available. The types
+//! cannot be made outside this crate, whose only user of them is `dispatch`. That is the argument
+//! of every block below, and why the operations may be safe functions.
+
+use std::arch::x86_64::{
+    __m128, __m256, __m256i, _CMP_LE_OQ, _CMP_NEQ_OQ, _mm_add_ps, _mm_and_ps, _mm_andnot_ps,
+    _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_max_ps, _mm_min_ps, _mm_movemask_ps,
+    _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps, _mm_sub_ps, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
+    _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps,
+    _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps,
+    _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
+    _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
+    _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_xor_ps,
+};
+
+use super::{Lanes, stack::Stack};
+
+/// Four lanes in an SSE register.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct F32x4(__m128);
+
+/// Eight lanes in an AVX register.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct F32x8(__m256);
+
+/// The result of a comparison of four lanes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mask4(__m128);
+
+/// The result of a comparison of eight lanes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mask8(__m256);
+
+macro_rules! lanes_by_intrinsics {
+    ($lanes:ident, $mask:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident,
+     $mul:ident, $div:ident, $fmadd:ident, $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
+     $cmp:ident, $movemask:ident $(, $push:item)?) => {
+        impl std::ops::BitAnd for $mask {
+            type Output = Self;
+            #[inline(always)]
+            fn bitand(self, other: Self) -> Self {
+                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
+                Self(unsafe { $and(self.0, other.0) })
+            }
+        }
+
+        impl Lanes<$n> for $lanes {
+            type Mask = $mask;
+
+            #[inline(always)]
+            fn splat(value: f32) -> Self {
+                // SAFETY: only kernels entered after AVX2 was detected call this (file header).
+                Self(unsafe { $set1(value) })
+            }
+            #[inline(always)]
+            fn load(array: &[f32; $n]) -> Self {
+                // SAFETY: as `splat`; the array holds exactly the lanes that are read, and the
+                // unaligned load asks for no alignment.
+                Self(unsafe { $load(array.as_ptr()) })
+            }
+            #[inline(always)]
+            fn store(self) -> [f32; $n] {
+                let mut array = [0.0; $n];
+                // SAFETY: AVX2 is available (file header); the array holds exactly the lanes that
+                // are written, and the unaligned store asks for no alignment.
+                unsafe { $store(array.as_mut_ptr(), self.0) };
+                array
+            }
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
+                Self(unsafe { $add(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $sub(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $mul(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn div(self, other: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $div(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, addend: Self) -> Self {
+                // SAFETY: as `add`; FMA is detected together with AVX2.
+                Self(unsafe { $fmadd(self.0, factor.0, addend.0) })
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $min(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $max(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $andnot($set1(-0.0), self.0) })
+            }
+            #[inline(always)]
+            fn xor_sign(self, sign: Self) -> Self {
+                // SAFETY: as `add`.
+                Self(unsafe { $xor(self.0, $and(sign.0, $set1(-0.0))) })
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> Self::Mask {
+                // SAFETY: as `add`.
+                $mask(unsafe { $cmp::<_CMP_LE_OQ>(self.0, other.0) })
+            }
+            #[inline(always)]
+            fn is_nonzero(self) -> Self::Mask {
+                // SAFETY: as `add`.
+                $mask(unsafe { $cmp::<_CMP_NEQ_OQ>(self.0, $set1(0.0)) })
+            }
+            #[inline(always)]
+            fn bits(mask: Self::Mask) -> u32 {
+                // SAFETY: as `add`.
+                (unsafe { $movemask(mask.0) }) as u32
+            }
+            $($push)?
+        }
+    };
+}
+
+lanes_by_intrinsics!(
+    F32x4,
+    Mask4,
+    4,
+    _mm_set1_ps,
+    _mm_loadu_ps,
+    _mm_storeu_ps,
+    _mm_add_ps,
+    _mm_sub_ps,
+    _mm_mul_ps,
+    _mm_div_ps,
+    _mm_fmadd_ps,
+    _mm_min_ps,
+    _mm_max_ps,
+    _mm_and_ps,
+    _mm_andnot_ps,
+    _mm_xor_ps,
+    _mm_cmp_ps,
+    _mm_movemask_ps
+);
+
+lanes_by_intrinsics!(
+    F32x8,
+    Mask8,
+    8,
+    _mm256_set1_ps,
+    _mm256_loadu_ps,
+    _mm256_storeu_ps,
+    _mm256_add_ps,
+    _mm256_sub_ps,
+    _mm256_mul_ps,
+    _mm256_div_ps,
+    _mm256_fmadd_ps,
+    _mm256_min_ps,
+    _mm256_max_ps,
+    _mm256_and_ps,
+    _mm256_andnot_ps,
+    _mm256_xor_ps,
+    _mm256_cmp_ps,
+    _mm256_movemask_ps,
+    /// Sorts by one permutation and closes the gaps by another, without a branch.
+    #[inline(always)]
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u32, stack: &mut Stack) {
+        // SAFETY: AVX2 is available (file header). The loads read the eight words of `children`
+        // and of one row of the table, whose index is below 256 because only eight bits of a
+        // mask of eight lanes can be set.
+        let (references, distances) = unsafe {
+            let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
+            let slots = _mm256_and_si256(
+                _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), fields),
+                _mm256_set1_epi32(7),
+            );
+            // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
+            let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
+            let signs =
+                std::arch::x86_64::_mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
+            let sorted = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_permutevar8x32_epi32(
+                signs, slots,
+            )));
+            let close =
+                _mm256_loadu_si256(COMPRESS[sorted as usize & 255].as_ptr().cast::<__m256i>());
+            let slots = _mm256_permutevar8x32_epi32(slots, close);
+            let children = _mm256_loadu_si256(children.as_ptr().cast::<__m256i>());
+            (
+                _mm256_permutevar8x32_epi32(children, slots),
+                _mm256_castps_si256(_mm256_permutevar8x32_ps(self.0, slots)),
+            )
+        };
+        stack.push_eight(references, distances, mask.count_ones());
+    }
+);
+
+/// Row m lists the set bits of m from the lowest to the highest, then zeros: the permutation that
+/// closes the gaps of a mask.
+static COMPRESS: [[u32; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut bit, mut filled) = (0, 0);
+        while bit < 8 {
+            if mask >> bit & 1 == 1 {
+                table[mask][filled] = bit as u32;
+                filled += 1;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    table
+};

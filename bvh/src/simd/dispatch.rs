@@ -1,0 +1,106 @@
+//! Enters the kernels: one function per instruction set that carries the target features, into
+//! which the generic kernel is inlined whole. A helper that were not inlined would be compiled for
+//! the baseline and lose its speed without a sound; the benchmark `kernels` watches the ratio.
+
+use wide::{f32x4, f32x8};
+
+#[cfg(target_arch = "x86_64")]
+use super::avx2;
+use super::{Isa, Lanes, portable::Pair};
+use crate::layout::tree::Tree;
+use crate::traverse::kernel::{self, Candidate, Count, RaySetup};
+
+/// The lane types that serve nodes of `N` children under each instruction set.
+pub(crate) trait Width<const N: usize> {
+    /// Portable lanes.
+    type Portable: Lanes<N>;
+    /// AVX2 lanes.
+    #[cfg(target_arch = "x86_64")]
+    type Avx2: Lanes<N>;
+}
+
+/// Names the widths that have kernels.
+#[derive(Debug)]
+pub(crate) struct Widths;
+
+impl Width<2> for Widths {
+    type Portable = Pair<f32x4>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = Pair<avx2::F32x4>;
+}
+
+impl Width<4> for Widths {
+    type Portable = f32x4;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = avx2::F32x4;
+}
+
+impl Width<8> for Widths {
+    type Portable = f32x8;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = avx2::F32x8;
+}
+
+/// The closest hit of a ray with a tree.
+#[inline]
+pub(crate) fn closest<const N: usize, const W: usize, C: Count>(
+    isa: Isa,
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> Option<Candidate>
+where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
+        Isa::Avx2 => unsafe { closest_avx2(tree, ray, count) },
+        _ => kernel::closest::<N, W, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+    }
+}
+
+/// Whether a ray hits anything in a tree.
+#[inline]
+pub(crate) fn any<const N: usize, const W: usize, C: Count>(
+    isa: Isa,
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> bool
+where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx2 => unsafe { any_avx2(tree, ray, count) },
+        _ => kernel::any::<N, W, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+fn closest_avx2<const N: usize, const W: usize, C: Count>(
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> Option<Candidate>
+where
+    Widths: Width<N>,
+{
+    kernel::closest::<N, W, <Widths as Width<N>>::Avx2, avx2::F32x4, C>(tree, ray, count)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+fn any_avx2<const N: usize, const W: usize, C: Count>(
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> bool
+where
+    Widths: Width<N>,
+{
+    kernel::any::<N, W, <Widths as Width<N>>::Avx2, avx2::F32x4, C>(tree, ray, count)
+}

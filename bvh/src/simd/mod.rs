@@ -1,0 +1,69 @@
+//! The SIMD room: the only place of this crate with `unsafe`.
+//!
+//! Four layers after BurntSushi/memchr: [`Lanes`] is the handful of operations that traversal
+//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`] and
+//! [`avx2`] are the two implementations; [`dispatch`] enters one kernel per instruction set, chosen
+//! once by [`Isa`].
+//!
+//! Invariant: the operations of [`Lanes`] other than [`Lanes::mul_add`] round once each in the
+//! same way in every implementation, so that a triangle test gives the same bits everywhere.
+//! `mul_add` may round once or twice and is for box tests alone, which are conservative.
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx2;
+pub(crate) mod dispatch;
+pub(crate) mod isa;
+pub(crate) mod portable;
+pub(crate) mod stack;
+
+pub use isa::Isa;
+
+/// `N` lanes of `f32`.
+pub(crate) trait Lanes<const N: usize>: Copy {
+    /// One bit per lane, before it is read out.
+    type Mask: Copy + std::ops::BitAnd<Output = Self::Mask>;
+
+    /// The same value in every lane.
+    fn splat(value: f32) -> Self;
+    /// The lanes of an array.
+    fn load(array: &[f32; N]) -> Self;
+    /// The lanes as an array.
+    fn store(self) -> [f32; N];
+    /// Sum.
+    fn add(self, other: Self) -> Self;
+    /// Difference.
+    fn sub(self, other: Self) -> Self;
+    /// Product.
+    fn mul(self, other: Self) -> Self;
+    /// Quotient, correctly rounded.
+    fn div(self, other: Self) -> Self;
+    /// `self · factor + addend`, rounded once or twice: for box tests alone.
+    fn mul_add(self, factor: Self, addend: Self) -> Self;
+    /// The smaller; unspecified if one is NaN.
+    fn min(self, other: Self) -> Self;
+    /// The larger; unspecified if one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// The magnitude.
+    fn abs(self) -> Self;
+    /// This value, its sign flipped where `sign` is negative (−0 included).
+    fn xor_sign(self, sign: Self) -> Self;
+    /// Where `self ≤ other`.
+    fn le(self, other: Self) -> Self::Mask;
+    /// Where `self` is not 0.
+    fn is_nonzero(self) -> Self::Mask;
+    /// Bit i of the result is lane i.
+    fn bits(mask: Self::Mask) -> u32;
+
+    /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
+    /// `self`, in the order of the child numbers that `order` holds in fields of
+    /// `log2(N)` bits, lowest field first.
+    #[inline(always)]
+    fn push_children(self, mask: u32, children: &[u32; N], order: u32, stack: &mut stack::Stack) {
+        let distances = self.store();
+        let bits = N.trailing_zeros();
+        for k in 0..N as u32 {
+            let slot = (order >> (k * bits)) as usize & (N - 1);
+            stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! Traversal of a tree by one ray, generic over node width and lanes.
+//!
+//! Boxes are tested by slabs (Kay, Kajiya, *Ray Tracing Complex Scenes*, 1986) with one
+//! multiplication and addition per plane; rounding is paid for by one pad per ray and axis, added
+//! once (see `triangle` for the bound). Children are pushed from the farthest to the nearest by
+//! the order stored for the ray's octant.
+//!
+//! Invariants: no node is passed by whose triangles the slow twin would hit at or before the best
+//! distance (so a popped entry is dropped only if it starts strictly behind it); equal distances
+//! are decided by the lowest id. Together they make the hit a function of ray and triangles alone.
+
+use glam::Vec3;
+
+use super::triangle::{NODE_PAD, RayLanes, TRIANGLE_PAD};
+use crate::{
+    layout::{
+        node::{ChildRef, Node},
+        tree::Tree,
+    },
+    ray::{Ray, Work},
+    simd::{Lanes, stack::Stack},
+};
+
+/// Bound S of the magnitude of scaled coordinates.
+pub(crate) const COORDINATE_BOUND: f32 = 2.0;
+
+/// Smaller components of a direction whose largest lies in 1..2 act as this in box tests.
+const SMALLEST_COMPONENT: f32 = 1.0 / (1u64 << 60) as f32;
+
+/// Origins farther away than this, in units of [`COORDINATE_BOUND`], hit nothing: the products of
+/// the box test would leave the range of f32.
+const FARTHEST_ORIGIN: f32 = (1u64 << 60) as f32;
+
+/// A ray in the scaled space of a tree, with all that does not change along it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RaySetup {
+    pub(crate) origin: [f32; 3],
+    /// Scaled by a power of two so that the largest magnitude lies in 1..2.
+    pub(crate) direction: [f32; 3],
+    pub(crate) reciprocal: [f32; 3],
+    pub(crate) triangle_pad: [f32; 3],
+    pub(crate) t_min: f32,
+    pub(crate) t_max: f32,
+    octant: usize,
+    /// Distances in the caller's unit are those here times this, twice: the product of two powers
+    /// of two, which may leave the range of f32 if formed first.
+    unscale: [f32; 2],
+}
+
+impl RaySetup {
+    /// Prepares a ray for a tree whose coordinates are those of the caller times `scale`, a power
+    /// of two. `None` if the ray can hit nothing: not finite, without direction, an empty
+    /// interval, or an origin so far away that it has no precision left.
+    #[inline]
+    pub(crate) fn new(ray: &Ray, scale: f32) -> Option<Self> {
+        let origin = ray.origin * scale;
+        let largest = ray.direction.abs().max_element();
+        let t_min = ray.t_min.max(0.0);
+        // Comparisons are written so that NaN fails them; max_element may drop a NaN, so the
+        // components are asked too.
+        let usable = largest > 0.0
+            && ray.direction.is_finite()
+            && origin.abs().cmple(Vec3::splat(FARTHEST_ORIGIN)).all()
+            && t_min <= ray.t_max
+            && !ray.t_min.is_nan();
+        if !usable {
+            return None;
+        }
+        // A subnormal direction is lifted first: its power of two has no reciprocal in f32.
+        let lift = if largest < f32::MIN_POSITIVE {
+            (1u32 << 24) as f32
+        } else {
+            1.0
+        };
+        let direction_scale = power_of_two_below(largest * lift).recip();
+        let direction = ray.direction * lift * direction_scale;
+        let reciprocal = direction.to_array().map(|d| {
+            if d.abs() < SMALLEST_COMPONENT {
+                SMALLEST_COMPONENT.copysign(d)
+            } else {
+                d
+            }
+            .recip()
+        });
+        let margin: [f32; 3] = std::array::from_fn(|axis| {
+            (COORDINATE_BOUND + origin[axis].abs()) * reciprocal[axis].abs()
+        });
+        // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
+        let unscale = [direction_scale, lift / scale];
+        let scaled = |t: f32| t * (scale / lift) * direction_scale.recip();
+        Some(Self {
+            origin: origin.to_array(),
+            direction: direction.to_array(),
+            reciprocal,
+            triangle_pad: margin.map(|m| m * TRIANGLE_PAD),
+            t_min: scaled(t_min),
+            t_max: scaled(ray.t_max),
+            octant: (0..3)
+                .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
+                .sum(),
+            unscale,
+        })
+    }
+
+    /// A distance along the scaled ray in the caller's unit.
+    #[inline]
+    pub(crate) fn unscaled(&self, t: f32) -> f32 {
+        t * self.unscale[0] * self.unscale[1]
+    }
+}
+
+/// The largest power of two that is not above a positive normal number.
+#[inline]
+pub(crate) fn power_of_two_below(value: f32) -> f32 {
+    f32::from_bits(value.to_bits() & 0x7f80_0000)
+}
+
+/// A hit in the scaled space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Candidate {
+    pub(crate) t: f32,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) id: u32,
+}
+
+impl Candidate {
+    /// Whether this is hit before `(t, id)`: nearer, or as near with a lower number.
+    #[inline(always)]
+    pub(crate) fn precedes(&self, t: f32, id: u32) -> bool {
+        self.t < t || (self.t == t && self.id < id)
+    }
+}
+
+/// Counts work, or does nothing at no cost.
+pub(crate) trait Count {
+    fn node(&mut self);
+    fn block(&mut self);
+}
+
+impl Count for () {
+    #[inline(always)]
+    fn node(&mut self) {}
+    #[inline(always)]
+    fn block(&mut self) {}
+}
+
+impl Count for Work {
+    #[inline(always)]
+    fn node(&mut self) {
+        self.nodes += 1;
+    }
+    #[inline(always)]
+    fn block(&mut self) {
+        self.blocks += 1;
+    }
+}
+
+/// A ray in lanes of children.
+struct BoxLanes<L> {
+    reciprocal: [L; 3],
+    near_addend: [L; 3],
+    far_addend: [L; 3],
+    near_plane: [usize; 3],
+    t_min: L,
+}
+
+impl<L> BoxLanes<L> {
+    #[inline(always)]
+    fn new<const N: usize>(ray: &RaySetup) -> Self
+    where
+        L: Lanes<N>,
+    {
+        let pad: [f32; 3] = ray.triangle_pad.map(|pad| pad * (NODE_PAD / TRIANGLE_PAD));
+        let offset: [f32; 3] = std::array::from_fn(|axis| -ray.origin[axis] * ray.reciprocal[axis]);
+        Self {
+            reciprocal: ray.reciprocal.map(L::splat),
+            near_addend: std::array::from_fn(|axis| L::splat(offset[axis] - pad[axis])),
+            far_addend: std::array::from_fn(|axis| L::splat(offset[axis] + pad[axis])),
+            near_plane: std::array::from_fn(|axis| 2 * axis + (ray.octant >> axis & 1)),
+            t_min: L::splat(ray.t_min),
+        }
+    }
+
+    /// Distances at which the boxes of a node are entered, and one bit per box that is.
+    #[inline(always)]
+    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
+    where
+        L: Lanes<N>,
+    {
+        let near = |axis: usize| {
+            L::load(&node.planes[self.near_plane[axis]])
+                .mul_add(self.reciprocal[axis], self.near_addend[axis])
+        };
+        let far = |axis: usize| {
+            L::load(&node.planes[self.near_plane[axis] ^ 1])
+                .mul_add(self.reciprocal[axis], self.far_addend[axis])
+        };
+        let enter = near(0).max(near(1)).max(near(2).max(self.t_min));
+        let leave = far(0).min(far(1)).min(far(2).min(L::splat(t_max)));
+        (enter, L::bits(enter.le(leave)))
+    }
+}
+
+/// The closest hit, equal distances decided by the lowest id.
+#[inline(always)]
+pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: Count>(
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> Option<Candidate> {
+    let boxes = BoxLanes::<L>::new(ray);
+    let triangles = RayLanes::<T>::new(ray);
+    let mut best = Candidate {
+        t: ray.t_max,
+        u: 0.0,
+        v: 0.0,
+        id: u32::MAX,
+    };
+    let mut stack = Stack::new();
+    stack.push_if(
+        u32::from(!tree.nodes.is_empty()),
+        ChildRef::inner(0).0,
+        ray.t_min,
+    );
+    while let Some((reference, distance)) = stack.pop() {
+        if distance > best.t {
+            continue;
+        }
+        let reference = ChildRef(reference);
+        if !reference.is_leaf() {
+            count.node();
+            let node = &tree.nodes[reference.0 as usize];
+            let (enter, mask) = boxes.test(node, best.t);
+            enter.push_children(mask, &node.children, node.order(ray.octant), &mut stack);
+            continue;
+        }
+        for block in &tree.blocks[reference.blocks()] {
+            count.block();
+            let hits = triangles.test(ray, block, best.t);
+            if hits.mask != 0 {
+                keep_best(
+                    &mut best,
+                    &hits.t.store(),
+                    &hits.u.store(),
+                    &hits.v.store(),
+                    &block.id,
+                    hits.mask,
+                );
+            }
+        }
+    }
+    (best.id != u32::MAX).then_some(best)
+}
+
+#[inline(always)]
+fn keep_best(
+    best: &mut Candidate,
+    t: &[f32; 4],
+    u: &[f32; 4],
+    v: &[f32; 4],
+    id: &[u32; 4],
+    mask: u32,
+) {
+    for lane in 0..4 {
+        let candidate = Candidate {
+            t: t[lane],
+            u: u[lane],
+            v: v[lane],
+            id: id[lane],
+        };
+        if mask >> lane & 1 == 1 && candidate.precedes(best.t, best.id) {
+            *best = candidate;
+        }
+    }
+}
+
+/// Whether anything is hit.
+#[inline(always)]
+pub(crate) fn any<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: Count>(
+    tree: &Tree<N, W>,
+    ray: &RaySetup,
+    count: &mut C,
+) -> bool {
+    let boxes = BoxLanes::<L>::new(ray);
+    let triangles = RayLanes::<T>::new(ray);
+    let mut stack = Stack::new();
+    stack.push_if(
+        u32::from(!tree.nodes.is_empty()),
+        ChildRef::inner(0).0,
+        ray.t_min,
+    );
+    while let Some((reference, _)) = stack.pop() {
+        let reference = ChildRef(reference);
+        if !reference.is_leaf() {
+            count.node();
+            let node = &tree.nodes[reference.0 as usize];
+            let (enter, mask) = boxes.test(node, ray.t_max);
+            enter.push_children(mask, &node.children, Node::<N, W>::SLOT_ORDER, &mut stack);
+            continue;
+        }
+        for block in &tree.blocks[reference.blocks()] {
+            count.block();
+            if triangles.test(ray, block, ray.t_max).mask != 0 {
+                return true;
+            }
+        }
+    }
+    false
+}

@@ -1,0 +1,93 @@
+//! The slow twin of every kernel: a loop over all triangles, without tree and without lanes, in
+//! plain `f32`. Kernels must give the same bits.
+
+use glam::Vec3;
+
+use super::{
+    kernel::{Candidate, RaySetup},
+    triangle::UNIT_ROUNDOFF,
+};
+use crate::{
+    bvh::{bounds_of, first_ids, hit_of, scale_of},
+    error::BuildError,
+    mesh::TriangleMesh,
+    ray::{Hit, Ray},
+};
+
+/// The closest hit of a ray with meshes, by testing every triangle.
+///
+/// # Errors
+/// As [`Bvh::build`](crate::Bvh::build), for the same meshes.
+pub fn closest_hit(meshes: &[&TriangleMesh], ray: &Ray) -> Result<Option<Hit>, BuildError> {
+    let first_ids = first_ids(meshes)?;
+    let scale = scale_of(&bounds_of(meshes))?;
+    let Some(setup) = RaySetup::new(ray, scale) else {
+        return Ok(None);
+    };
+    let mut best: Option<Candidate> = None;
+    for (mesh, &first_id) in meshes.iter().zip(&first_ids) {
+        for primitive_id in 0..mesh.triangles().len() as u32 {
+            let corners = mesh.corners(primitive_id).map(|v| v * scale);
+            let Some((t, u, v)) = triangle(&setup, corners) else {
+                continue;
+            };
+            let candidate = Candidate {
+                t,
+                u,
+                v,
+                id: first_id + primitive_id,
+            };
+            if best.is_none_or(|best| candidate.precedes(best.t, best.id)) {
+                best = Some(candidate);
+            }
+        }
+    }
+    Ok(best.map(|best| hit_of(&best, &setup, &first_ids)))
+}
+
+/// Distance and weights of vertices 1 and 2 where the ray meets a triangle.
+fn triangle(ray: &RaySetup, [v0, v1, v2]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
+    let origin = Vec3::from(ray.origin);
+    let direction = Vec3::from(ray.direction);
+    let (edge_1, edge_2) = (v0 - v1, v2 - v0);
+    let to_vertex = v0 - origin;
+    let r = cross(to_vertex, direction);
+    let normal = cross(edge_2, edge_1);
+    let den = dot(normal, direction);
+    let flip = |x: f32| if den.is_sign_negative() { -x } else { x };
+    let (u, v) = (flip(dot(r, edge_2)), flip(dot(r, edge_1)));
+    if den == 0.0 || u < 0.0 || v < 0.0 || u + v > den.abs() {
+        return None;
+    }
+    let t = flip(dot(normal, to_vertex)) / den.abs();
+
+    // The interval in which the ray is inside the triangle's box, widened by 8 roundoffs.
+    let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
+    for axis in 0..3 {
+        let (a, b, c) = (v0[axis], v0[axis] - edge_1[axis], v0[axis] + edge_2[axis]);
+        let at = |plane: f32| (plane - ray.origin[axis]) * ray.reciprocal[axis];
+        let (low, high) = (at(a.min(b).min(c)), at(a.max(b).max(c)));
+        let pad =
+            (2.0 + ray.origin[axis].abs()) * ray.reciprocal[axis].abs() * (8.0 * UNIT_ROUNDOFF);
+        enter = enter.max(low.min(high) - pad);
+        leave = leave.min(low.max(high) + pad);
+    }
+    let t = t.max(enter).min(leave);
+    (enter <= leave && ray.t_min <= t && t <= ray.t_max).then_some((
+        t,
+        u / den.abs(),
+        v / den.abs(),
+    ))
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::new(
+        a.y * b.z - a.z * b.y,
+        a.z * b.x - a.x * b.z,
+        a.x * b.y - a.y * b.x,
+    )
+}
+
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}

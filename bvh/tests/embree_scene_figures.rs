@@ -1,0 +1,73 @@
+//! With the settings that Embree uses for its own scenes, the tree has the nodes, leaves, depth
+//! and costs that Embree 4.4 reports for the same meshes (one line per scene of
+//! `scene_level.jsonl` of the shared data, read off the library's verbose output).
+
+use std::{io::Read, path::Path};
+
+use raywright_bvh::{BuildParams, Bvh, TriangleMesh, Vec3};
+
+/// All triangles of a file that has only triangles, degenerate ones too, since Embree keeps them.
+fn read(path: &Path) -> Option<TriangleMesh> {
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(std::fs::File::open(path).ok()?)
+        .read_to_string(&mut text)
+        .ok()?;
+    let (mut vertices, mut triangles) = (vec![], vec![]);
+    for line in text.lines() {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => {
+                let v: Vec<f32> = words.map(|w| w.parse().unwrap()).collect();
+                vertices.push(Vec3::from_slice(&v));
+            }
+            Some("f") => {
+                let index = |w: &str| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
+                let corners: Vec<u32> = words.map(index).collect();
+                triangles.push(corners.try_into().unwrap());
+            }
+            _ => {}
+        }
+    }
+    TriangleMesh::new(vertices, triangles).ok()
+}
+
+#[test]
+fn nodes_leaves_depth_and_cost_are_embrees() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/scenes");
+    // Scene, branching factor, inner nodes, leaves, SAH of nodes, SAH of blocks, fill, depth.
+    let expected = [
+        ("sponza", 8, 15_053, 63_191, 13.810, 9.092, 0.6497, 13),
+        ("sponza", 4, 23_278, 58_017, 21.603, 9.674, 0.8731, 18),
+        ("fireplace_room", 8, 9_008, 35_058, 8.683, 3.865, 0.6115, 11),
+    ];
+    for (name, branching_factor, nodes, leaves, sah_nodes, sah_blocks, fill, depth) in expected {
+        let Some(mesh) = read(&scenes.join(format!("{name}/{name}.obj.gz"))) else {
+            eprintln!("skipped: {name} is not in {}", scenes.display());
+            continue;
+        };
+        let mut params = BuildParams::embree_scene_medium();
+        params.branching_factor = branching_factor;
+        let stats = Bvh::build(&[&mesh], &params).unwrap().stats();
+        assert_eq!(
+            (stats.nodes, stats.leaves, stats.depth),
+            (nodes, leaves, depth),
+            "{name}"
+        );
+        assert_eq!(stats.references, mesh.triangles().len());
+        assert!(
+            (stats.sah_nodes - sah_nodes).abs() < 5.1e-4,
+            "{name}: {}",
+            stats.sah_nodes
+        );
+        assert!(
+            (stats.sah_blocks - sah_blocks).abs() < 5.1e-4,
+            "{name}: {}",
+            stats.sah_blocks
+        );
+        assert!(
+            (stats.node_fill - fill).abs() < 5.1e-5,
+            "{name}: {}",
+            stats.node_fill
+        );
+    }
+}

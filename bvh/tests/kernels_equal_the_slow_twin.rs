@@ -1,0 +1,275 @@
+//! Every kernel against testing every triangle: the same bits, for every branching factor, every
+//! instruction set, any parameters, any rays.
+
+use proptest::prelude::*;
+use raywright_bvh::{BuildError, BuildParams, Bvh, Hit, Isa, Ray, TriangleMesh, Vec3, reference};
+
+type Bits = Option<(u32, u32, u32, u32, u32)>;
+
+fn bits(hit: Option<Hit>) -> Bits {
+    hit.map(|h| {
+        (
+            h.t.to_bits(),
+            h.u.to_bits(),
+            h.v.to_bits(),
+            h.geometry_id,
+            h.primitive_id,
+        )
+    })
+}
+
+/// Trees of every branching factor and instruction set that this machine has.
+fn trees(meshes: &[&TriangleMesh], params: &BuildParams) -> Vec<Bvh> {
+    let mut trees = Vec::new();
+    for branching_factor in [2, 4, 8] {
+        let mut params = *params;
+        params.branching_factor = branching_factor;
+        let tree = match Bvh::build(meshes, &params) {
+            Ok(tree) => tree,
+            Err(BuildError::DepthLimit { .. }) => continue,
+            Err(error) => panic!("{error}"),
+        };
+        trees.extend(
+            Isa::ALL
+                .into_iter()
+                .filter_map(|isa| tree.clone().with_isa(isa)),
+        );
+    }
+    trees
+}
+
+fn check(
+    meshes: &[&TriangleMesh],
+    params: &BuildParams,
+    rays: &[Ray],
+) -> Result<usize, TestCaseError> {
+    let trees = trees(meshes, params);
+    let mut hits = 0;
+    for ray in rays {
+        let expected = bits(reference::closest_hit(meshes, ray).unwrap());
+        hits += usize::from(expected.is_some());
+        for tree in &trees {
+            let context = format!("{} {:?} {ray:?}", tree.isa(), tree.params());
+            prop_assert_eq!(bits(tree.closest_hit(ray)), expected, "{}", context);
+            prop_assert_eq!(tree.any_hit(ray), expected.is_some(), "{}", context);
+        }
+    }
+    Ok(hits)
+}
+
+fn vector(range: f32) -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-range..range).prop_map(Vec3::from)
+}
+
+/// Coordinates that meet exactly: small whole numbers, of which many triangles are degenerate,
+/// coplanar or the same.
+fn lattice_vector() -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-3i8..=3).prop_map(|v| Vec3::from(v.map(f32::from)))
+}
+
+fn soup(vertex: impl Strategy<Value = Vec3>, most: usize) -> impl Strategy<Value = TriangleMesh> {
+    prop::collection::vec(prop::array::uniform3(vertex), 0..most).prop_map(|corners| {
+        let triangles = (0..corners.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+            .collect();
+        TriangleMesh::new(corners.concat(), triangles).unwrap()
+    })
+}
+
+fn params() -> impl Strategy<Value = BuildParams> {
+    (
+        9u32..40,
+        1u32..=32,
+        1u32..=32,
+        1u32..=32,
+        0f32..10.0,
+        0f32..10.0,
+    )
+        .prop_map(
+            |(depth, block, min_leaf, max_leaf, traversal, intersection)| {
+                let mut params = BuildParams::default();
+                params.max_depth = depth;
+                params.sah_block_size = block;
+                params.min_leaf_size = min_leaf;
+                params.max_leaf_size = max_leaf;
+                params.traversal_cost = traversal;
+                params.intersection_cost = intersection;
+                params
+            },
+        )
+}
+
+fn rays(
+    origin: impl Strategy<Value = Vec3>,
+    direction: impl Strategy<Value = Vec3>,
+) -> impl Strategy<Value = Vec<Ray>> {
+    prop::collection::vec(
+        (origin, direction, 0f32..1.0, 0f32..4.0, any::<bool>()).prop_map(
+            |(o, d, t_min, length, bounded)| {
+                let ray = Ray::new(o, d);
+                if bounded {
+                    ray.with_range(t_min, t_min + length)
+                } else {
+                    ray
+                }
+            },
+        ),
+        20,
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+
+    #[test]
+    fn random_triangles(
+        mesh in soup(vector(1.0), 200), other in soup(vector(0.3), 60), params in params(),
+        rays in rays(vector(2.0), vector(1.0)),
+    ) {
+        check(&[&mesh, &other], &params, &rays)?;
+    }
+
+    #[test]
+    fn lattice_triangles_and_lattice_rays(
+        mesh in soup(lattice_vector(), 200), params in params(), rays in rays(lattice_vector(), lattice_vector()),
+    ) {
+        check(&[&mesh], &params, &rays)?;
+    }
+
+    /// Long thin triangles seen at a grazing angle, where `T / den` can be anything.
+    #[test]
+    fn slivers_and_grazing_rays(
+        mesh in soup((vector(1.0), -20i32..=0).prop_map(|(v, e)| Vec3::new(v.x, v.y * 2f32.powi(e), v.z)), 100),
+        params in params(),
+        rays in rays(vector(1.0).prop_map(|v| v * Vec3::new(2.0, 1e-6, 2.0)),
+                     (vector(1.0), -24i32..=-2).prop_map(|(v, e)| Vec3::new(v.x, v.y * 2f32.powi(e), v.z))),
+    ) {
+        check(&[&mesh], &params, &rays)?;
+    }
+
+    #[test]
+    fn far_from_the_origin_and_at_any_scale(
+        mesh in soup(vector(1.0), 100), params in params(), rays in rays(vector(2.0), vector(1.0)),
+        shift in 0f32..1e5, exponent in -80i32..80,
+    ) {
+        let scale = 2f32.powi(exponent);
+        let place = |v: Vec3| (v + shift) * scale;
+        let moved = TriangleMesh::new(
+            mesh.vertices().iter().map(|&v| place(v)).collect(), mesh.triangles().to_vec()).unwrap();
+        let rays: Vec<Ray> = rays.iter().map(|r| Ray::new(place(r.origin), r.direction)).collect();
+        check(&[&moved], &params, &rays)?;
+    }
+}
+
+#[test]
+fn a_power_of_two_changes_no_bit() {
+    let triangle = |s: f32| {
+        let v = [
+            Vec3::new(0.1, 0.2, 0.3),
+            Vec3::new(1.3, -0.4, 0.2),
+            Vec3::new(0.2, 1.7, -0.1),
+        ];
+        TriangleMesh::new(v.map(|v| v * s).to_vec(), vec![[0, 1, 2]]).unwrap()
+    };
+    let hit = |s: f32| {
+        let mesh = triangle(s);
+        let tree = Bvh::build(&[&mesh], &BuildParams::default()).unwrap();
+        tree.closest_hit(&Ray::new(
+            Vec3::new(0.4, 0.3, 2.0) * s,
+            Vec3::new(0.03, 0.02, -1.0) * s,
+        ))
+        .unwrap()
+    };
+    let expected = hit(1.0);
+    for exponent in -90..=90 {
+        assert_eq!(hit(2f32.powi(exponent)), expected, "2^{exponent}");
+    }
+}
+
+#[test]
+fn equal_distances_go_to_the_lowest_ids() {
+    let quad = |z: f32| {
+        TriangleMesh::new(
+            vec![
+                Vec3::new(-1.0, -1.0, z),
+                Vec3::new(1.0, -1.0, z),
+                Vec3::new(0.0, 1.0, z),
+            ],
+            vec![[0, 1, 2]; 40],
+        )
+        .unwrap()
+    };
+    let (empty, far, near) = (TriangleMesh::default(), quad(-2.0), quad(-1.0));
+    for tree in trees(
+        &[&empty, &far, &empty, &near, &near],
+        &BuildParams::default(),
+    ) {
+        let hit = tree.closest_hit(&Ray::new(Vec3::ZERO, -Vec3::Z)).unwrap();
+        assert_eq!((hit.geometry_id, hit.primitive_id, hit.t), (3, 0, 1.0));
+    }
+}
+
+#[test]
+fn rays_that_can_hit_nothing() {
+    let mesh = TriangleMesh::new(vec![-Vec3::ONE, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap();
+    let (inf, nan) = (f32::INFINITY, f32::NAN);
+    let origin = Vec3::splat(-3.0);
+    let unusable = [
+        Ray::new(Vec3::splat(nan), Vec3::ONE),
+        Ray::new(Vec3::splat(inf), Vec3::ONE),
+        Ray::new(origin, Vec3::ZERO),
+        Ray::new(origin, Vec3::new(nan, 1.0, 1.0)),
+        Ray::new(origin, Vec3::new(inf, 1.0, 1.0)),
+        Ray::new(origin, Vec3::ONE).with_range(nan, 1.0),
+        Ray::new(origin, Vec3::ONE).with_range(0.0, nan),
+        Ray::new(origin, Vec3::ONE).with_range(2.0, 1.0),
+        Ray::new(origin, Vec3::ONE).with_range(0.0, -inf),
+        Ray::new(Vec3::splat(-1e30), Vec3::ONE),
+    ];
+    for tree in trees(&[&mesh], &BuildParams::default()) {
+        assert!(tree.any_hit(&Ray::new(origin, Vec3::ONE)));
+        assert!(
+            tree.any_hit(&Ray::new(origin, Vec3::ONE).with_range(-5.0, inf)),
+            "a negative start acts as 0"
+        );
+        assert!(
+            tree.any_hit(&Ray::new(origin, Vec3::ONE * 1e-42)),
+            "a subnormal direction is a direction"
+        );
+        assert!(tree.any_hit(&Ray::new(origin, Vec3::ONE * 1e38)));
+        for ray in &unusable {
+            assert_eq!(tree.closest_hit(ray), None, "{ray:?}");
+            assert!(!tree.any_hit(ray), "{ray:?}");
+        }
+    }
+}
+
+#[test]
+fn interval_ends_belong_to_the_interval() {
+    let mesh = TriangleMesh::new(
+        vec![
+            -Vec3::ONE,
+            Vec3::new(3.0, -1.0, -1.0),
+            Vec3::new(-1.0, 3.0, -1.0),
+        ],
+        vec![[0, 1, 2]],
+    )
+    .unwrap();
+    let ray = Ray::new(Vec3::ZERO, -Vec3::Z);
+    let (before, after) = (1f32.next_down(), 1f32.next_up());
+    for tree in trees(&[&mesh], &BuildParams::default()) {
+        for (t_min, t_max, hit) in [
+            (1.0, 1.0, true),
+            (0.0, 1.0, true),
+            (1.0, 2.0, true),
+            (after, 2.0, false),
+            (0.0, before, false),
+        ] {
+            assert_eq!(
+                tree.any_hit(&ray.with_range(t_min, t_max)),
+                hit,
+                "[{t_min}, {t_max}]"
+            );
+        }
+    }
+}
