@@ -1,13 +1,13 @@
 //! What a tuning run leaves behind, as plain data: the JSON lines and the HTML page are made from
 //! these values and from nothing else. Times are milliseconds of wall clock.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The layout of the JSON lines; raised whenever a key changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// What was tuned, and how: the first line of a log.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunHeader {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
@@ -40,7 +40,7 @@ pub struct RunHeader {
 }
 
 /// One frame of the search.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Number of the frame, from 0.
     pub frame: usize,
@@ -61,7 +61,7 @@ pub struct FrameRecord {
 }
 
 /// Median and quartiles of repeated measurements.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// The median.
     pub median: f64,
@@ -72,7 +72,7 @@ pub struct Spread {
 }
 
 /// One row of the interleaved comparison at the end of a run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ComparisonRow {
     /// `tuned`, or the name of the baseline.
     pub name: String,
@@ -89,7 +89,7 @@ pub struct ComparisonRow {
 }
 
 /// The last line of a log.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunSummary {
     /// How many rounds the comparison interleaved.
     pub rounds: usize,
@@ -100,7 +100,7 @@ pub struct RunSummary {
 }
 
 /// A whole run.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
     /// What was tuned, and how.
     pub header: RunHeader,

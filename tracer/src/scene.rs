@@ -4,7 +4,7 @@
 //! primaries; radiance for surfaces and environments, intensity for point lights, irradiance on a
 //! perpendicular surface for directional lights.
 
-use raywright_bvh::{TriangleMesh, Vec3};
+use raywright_bvh::{Aabb, TriangleMesh, Vec3};
 use raywright_imaging::Camera;
 
 /// A linear RGB colour or a radiometric quantity per channel.
@@ -136,5 +136,57 @@ impl Scene {
             .iter()
             .map(|m| m.triangles.triangles().len())
             .sum()
+    }
+
+    /// The box around all triangles.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        let corners = self.meshes.iter().flat_map(|mesh| {
+            let vertices = mesh.triangles.vertices();
+            mesh.triangles
+                .triangles()
+                .iter()
+                .flatten()
+                .map(|&index| vertices[index as usize])
+        });
+        corners.fold(Aabb::EMPTY, Aabb::extended_by)
+    }
+
+    /// Whether nothing emits light.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.lights.is_empty()
+            && self
+                .meshes
+                .iter()
+                .all(|mesh| !self.materials[mesh.material].is_emissive())
+    }
+
+    /// Adds a clear sky and a high sun if nothing emits light; says whether it did.
+    pub fn light_if_dark(&mut self) -> bool {
+        let dark = self.is_dark();
+        if dark {
+            self.lights.extend([
+                Light::Constant {
+                    radiance: Rgb::new(0.6, 0.8, 1.2),
+                },
+                Light::Directional {
+                    direction: Vec3::new(0.35, -1.0, 0.22),
+                    irradiance: Rgb::new(9.0, 8.0, 6.5),
+                },
+            ]);
+        }
+        dark
+    }
+
+    /// Adds a point light where the camera stands, strong enough to light what is half the scene's
+    /// diagonal away.
+    pub fn add_headlight(&mut self, camera: &Camera) {
+        let reach = self.bounds().diagonal() * 0.5;
+        let intensity = Rgb::splat(std::f32::consts::PI * reach * reach);
+        self.lights.push(Light::Point {
+            position: camera.origin,
+            intensity,
+        });
     }
 }

@@ -23,8 +23,8 @@ impl Stack {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self {
-            references: [MaybeUninit::uninit(); CAPACITY],
-            distances: [MaybeUninit::uninit(); CAPACITY],
+            references: [const { MaybeUninit::uninit() }; CAPACITY],
+            distances: [const { MaybeUninit::uninit() }; CAPACITY],
             top: 0,
         }
     }

@@ -1,0 +1,198 @@
+//! `raywright inspect`: what a scene is, and what a tree over it is like.
+
+use std::time::Instant;
+
+use clap::Args;
+use comfy_table::{Table, presets};
+use raywright::{
+    bvh::{BuildParams, TreeStats},
+    tracer::Indicators,
+};
+
+use super::{
+    Failure, output,
+    run_options::{ParameterOptions, RunOptions},
+    scene::SceneOptions,
+};
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    parameters: ParameterOptions,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(serde::Serialize)]
+struct Report {
+    schema_version: u32,
+    scene: String,
+    meshes: usize,
+    materials: usize,
+    triangles: usize,
+    emissive_meshes: usize,
+    other_lights: usize,
+    bounds_min: [f32; 3],
+    bounds_max: [f32; 3],
+    camera_origin: [f32; 3],
+    camera_target: [f32; 3],
+    camera_vertical_fov_degrees: f32,
+    indicators: Vec<(&'static str, f64)>,
+    parameters: Vec<(String, String)>,
+    tree: Vec<(&'static str, f64)>,
+    build_ms: f64,
+    notes: Vec<String>,
+}
+
+/// Prints the report.
+pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
+    let params = args.parameters.applied_to(BuildParams::default())?;
+    let report = args.run.install(|| {
+        let stage = args.scene.prepare()?;
+        let start = Instant::now();
+        let tree = stage.world.build_tree(&params, &mut Default::default())?;
+        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let scene = stage.world.scene();
+        let bounds = scene.bounds();
+        let corner = |v: raywright::bvh::Vec3| {
+            if bounds.is_empty() {
+                [0.0; 3]
+            } else {
+                v.to_array()
+            }
+        };
+        Ok(Report {
+            schema_version: 1,
+            scene: args.scene.scene.clone(),
+            meshes: scene.meshes.len(),
+            materials: scene.materials.len(),
+            triangles: scene.triangle_count(),
+            emissive_meshes: scene
+                .meshes
+                .iter()
+                .filter(|m| scene.materials[m.material].is_emissive())
+                .count(),
+            other_lights: scene.lights.len(),
+            bounds_min: corner(bounds.min),
+            bounds_max: corner(bounds.max),
+            camera_origin: stage.camera.origin.to_array(),
+            camera_target: stage.camera.target.to_array(),
+            camera_vertical_fov_degrees: stage.camera.vertical_fov_degrees,
+            indicators: Indicators::of(scene, &stage.camera).named().collect(),
+            parameters: raywright::tune::described(&params),
+            tree: tree_rows(&tree.stats()),
+            build_ms,
+            notes: stage.notes,
+        })
+    })?;
+    if args.json {
+        output::json(&report)
+    } else {
+        print(&report)
+    }
+}
+
+fn tree_rows(stats: &TreeStats) -> Vec<(&'static str, f64)> {
+    vec![
+        ("nodes", stats.nodes as f64),
+        ("leaves", stats.leaves as f64),
+        ("references", stats.references as f64),
+        ("depth", stats.depth as f64),
+        ("largest_leaf", stats.largest_leaf as f64),
+        ("node_fill", stats.node_fill),
+        ("sah_nodes", stats.sah_nodes),
+        ("sah_primitives", stats.sah_primitives),
+        ("sah_blocks", stats.sah_blocks),
+        ("sah_cost", stats.sah_cost),
+        ("bytes", stats.bytes as f64),
+        (
+            "bytes_per_reference",
+            stats.bytes as f64 / stats.references.max(1) as f64,
+        ),
+    ]
+}
+
+fn print(report: &Report) -> Result<(), Failure> {
+    let vector = |v: [f32; 3]| format!("{} {} {}", v[0], v[1], v[2]);
+    let scene = [
+        ("meshes", report.meshes.to_string()),
+        ("materials", report.materials.to_string()),
+        ("triangles", report.triangles.to_string()),
+        ("emissive meshes", report.emissive_meshes.to_string()),
+        ("other lights", report.other_lights.to_string()),
+        ("bounds min", vector(report.bounds_min)),
+        ("bounds max", vector(report.bounds_max)),
+        ("camera origin", vector(report.camera_origin)),
+        ("camera target", vector(report.camera_target)),
+        (
+            "vertical field of view",
+            format!("{}°", report.camera_vertical_fov_degrees),
+        ),
+    ];
+    section(&report.scene, scene)?;
+    section(
+        "indicators",
+        report
+            .indicators
+            .iter()
+            .map(|(name, value)| (*name, number(*value))),
+    )?;
+    section(
+        "parameters",
+        report
+            .parameters
+            .iter()
+            .map(|(name, value)| (name.as_str(), value.clone())),
+    )?;
+    let tree = report
+        .tree
+        .iter()
+        .map(|(name, value)| (*name, number(*value)));
+    section("tree", tree.chain([("build_ms", number(report.build_ms))]))
+}
+
+fn section<'a>(
+    title: &str,
+    rows: impl IntoIterator<Item = (&'a str, String)>,
+) -> Result<(), Failure> {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    for (name, value) in rows {
+        table.add_row([name.to_owned(), value]);
+    }
+    output::line(format_args!("{title}\n{table}\n"))
+}
+
+/// Six significant digits, without trailing zeros.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e7).contains(&value.abs()) {
+        let digits = (5 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 9) as usize;
+        let text = format!("{value:.digits$}");
+        return if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        };
+    }
+    format!("{value:.5e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_six_digits() {
+        assert_eq!(number(0.0), "0");
+        assert_eq!(number(262_204.0), "262204");
+        assert_eq!(number(13.810_123_4), "13.8101");
+        assert_eq!(number(0.5), "0.5");
+        assert_eq!(number(1.234_567_8e-7), "1.23457e-7");
+        assert_eq!(number(16_777_216.0), "1.67772e7");
+    }
+}

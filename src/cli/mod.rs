@@ -1,0 +1,47 @@
+//! Subcommands, one file each, and what they share.
+
+mod demo;
+mod failure;
+mod inspect;
+mod output;
+mod render;
+mod run_options;
+mod scene;
+mod tune;
+
+use clap::{Parser, Subcommand};
+
+pub(crate) use failure::Failure;
+
+/// A pure-Rust path tracer that tunes its own acceleration structure while it renders.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+#[command(after_help = "\
+Exit codes: 0 done, 1 a check failed, 2 bad input or usage, 130 interrupted.
+A SCENE is a file (.obj, .obj.gz) or a built-in scene (interior, voxel-terrain).")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a picture of a scene
+    Render(render::RenderArgs),
+    /// Search BVH parameters while frames of a scene are rendered
+    Tune(tune::TuneArgs),
+    /// Show counts, bounds, indicators and tree statistics of a scene
+    Inspect(inspect::InspectArgs),
+    /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
+    Demo(demo::DemoArgs),
+}
+
+/// Runs a command.
+pub(crate) fn run(cli: Cli) -> Result<(), Failure> {
+    match cli.command {
+        Command::Render(args) => render::run(&args),
+        Command::Tune(args) => tune::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Demo(args) => demo::run(&args),
+    }
+}

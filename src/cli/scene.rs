@@ -1,0 +1,152 @@
+//! The scene that a command works on: a file or a built-in scene, its lights, its camera.
+
+use std::path::Path;
+
+use clap::Args;
+use raywright::{
+    bvh::{BuildParams, Vec3},
+    imaging::Camera,
+    tracer::{World, automatic_camera, generate, load::load_scene},
+};
+
+use super::{Failure, output};
+
+/// Which scene, seen from where.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SceneOptions {
+    /// A file (.obj, .obj.gz) or a built-in scene (interior, voxel-terrain)
+    pub(crate) scene: String,
+    /// Where the camera stands: x,y,z (default: chosen to show much of the scene)
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "camera_target")]
+    camera_origin: Option<Vec3>,
+    /// Where the camera looks: x,y,z
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, requires = "camera_origin")]
+    camera_target: Option<Vec3>,
+    /// Full vertical field of view, in degrees
+    #[arg(long, value_name = "DEGREES")]
+    fov: Option<f32>,
+    /// Add a point light at the camera, for rooms that no sky reaches
+    #[arg(long)]
+    headlight: bool,
+}
+
+/// A scene that is ready.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    /// Its name, for files and titles.
+    pub(crate) name: String,
+    pub(crate) world: World,
+    pub(crate) camera: Camera,
+    /// What the user should know about the scene.
+    pub(crate) notes: Vec<String>,
+}
+
+impl SceneOptions {
+    /// A built-in scene with its own camera.
+    pub(crate) fn built_in(name: &str) -> Self {
+        Self {
+            scene: name.to_owned(),
+            camera_origin: None,
+            camera_target: None,
+            fov: None,
+            headlight: false,
+        }
+    }
+
+    /// Loads or generates the scene, and tells on standard error what the user should know.
+    pub(crate) fn prepare(&self) -> Result<Stage, Failure> {
+        let path = Path::new(&self.scene);
+        let mut notes = Vec::new();
+        let (name, mut scene) = match generate::by_name(&self.scene) {
+            Some(scene) if !path.exists() => (self.scene.clone(), scene),
+            _ => {
+                let loaded = load_scene(path).map_err(|error| match path.exists() {
+                    true => Failure::from(error),
+                    false => Failure::with_hint(
+                        error,
+                        format!(
+                            "give a file, or a built-in scene: {}",
+                            generate::NAMES.join(", ")
+                        ),
+                    ),
+                })?;
+                notes.extend(loaded.warnings.iter().map(ToString::to_string));
+                (stem(path), loaded.scene)
+            }
+        };
+        if self.headlight {
+            // The light needs the camera, which may need a tree: chosen before the lights are.
+            let camera = self.camera(&World::new(scene.clone()), scene.camera)?;
+            scene.add_headlight(&camera);
+            scene.camera = Some(camera);
+        }
+        if scene.light_if_dark() {
+            notes.push("the scene has no lights: it gets a sky and a sun (--headlight adds a light at the camera)".into());
+        }
+        let scene_camera = scene.camera;
+        let world = World::new(scene);
+        let camera = self.camera(&world, scene_camera)?;
+        for note in &notes {
+            output::note(format_args!("note: {note}"));
+        }
+        Ok(Stage {
+            name,
+            world,
+            camera,
+            notes,
+        })
+    }
+
+    fn camera(&self, world: &World, of_scene: Option<Camera>) -> Result<Camera, Failure> {
+        let mut camera = match (self.camera_origin, self.camera_target, of_scene) {
+            (Some(origin), Some(target), _) => Camera {
+                origin,
+                target,
+                up: Vec3::Y,
+                vertical_fov_degrees: 60.0,
+            },
+            (_, _, Some(camera)) => camera,
+            _ => {
+                let tree = world.build_tree(&BuildParams::default(), &mut Default::default())?;
+                automatic_camera(world, &tree)
+            }
+        };
+        camera.vertical_fov_degrees = self.fov.unwrap_or(camera.vertical_fov_degrees);
+        camera.validate()?;
+        Ok(camera)
+    }
+}
+
+/// The file name without its endings.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().map_or_else(
+        || "scene".into(),
+        |name| name.to_string_lossy().into_owned(),
+    );
+    name.split('.')
+        .next()
+        .filter(|stem| !stem.is_empty())
+        .unwrap_or("scene")
+        .to_owned()
+}
+
+fn vector(text: &str) -> Result<Vec3, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) => Ok(Vec3::new(x, y, z)),
+        _ => Err("three numbers are needed, as in 1.5,0,-2".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stems_and_vectors() {
+        assert_eq!(stem(Path::new("a/sponza.obj.gz")), "sponza");
+        assert_eq!(stem(Path::new("..")), "scene");
+        assert_eq!(vector("1, -2.5,3e1"), Ok(Vec3::new(1.0, -2.5, 30.0)));
+        assert!(vector("1,2").is_err() && vector("a,b,c").is_err());
+    }
+}

@@ -1,0 +1,411 @@
+//! `raywright tune`: a search of BVH parameters while frames are rendered, and its comparison with
+//! two baselines in the same run.
+//!
+//! Every frame is written to the log when it is done, so that an interrupted run keeps what it
+//! has. The report is made from the same records.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use clap::{Args, ValueEnum};
+use comfy_table::{Table, presets};
+use raywright::{
+    bvh::BuildParams,
+    imaging::{CancelToken, write_image},
+    report::{
+        self,
+        log::RunLog,
+        record::{
+            ComparisonRow, FrameRecord, RunHeader, RunRecord, RunSummary, SCHEMA_VERSION, Spread,
+        },
+    },
+    tracer::{Indicators, Integrator},
+    tune::{
+        self, Comparison, FrameReport, Metric, ParameterSpace, Session, Settings, WallClock,
+        milliseconds,
+    },
+    tuner::{SEARCH_NAMES, search_by_name},
+};
+
+use super::{
+    Failure, output,
+    run_options::{ParameterOptions, RunOptions, cancel_on_interrupt},
+    scene::{SceneOptions, Stage},
+};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MetricOption {
+    /// Time to render: the tree serves many frames
+    Render,
+    /// Time to build and render: the tree is built for each frame
+    Total,
+}
+
+/// What is tuned, and for how long.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct TuneArgs {
+    #[command(flatten)]
+    scene: SceneOptions,
+    /// Frames of the search, one sample per pixel each
+    #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// What is made small
+    #[arg(long, value_enum, default_value_t = MetricOption::Total)]
+    metric: MetricOption,
+    /// The search: random or nelder-mead (from a Latin hypercube)
+    #[arg(long, default_value = "nelder-mead", value_parser = clap::builder::PossibleValuesParser::new(SEARCH_NAMES))]
+    search: String,
+    /// Rounds of the comparison with both baselines at the end
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
+    rounds: u32,
+    /// Width of a frame in pixels
+    #[arg(long, default_value_t = 640)]
+    width: u32,
+    /// Height of a frame in pixels
+    #[arg(long, default_value_t = 360)]
+    height: u32,
+    /// Scattering events of a path, K
+    #[arg(long, default_value_t = Integrator::DEFAULT_PATH_LENGTH)]
+    path_length: u32,
+    /// Seed of the search and of the pictures
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for the log (.jsonl), the report (.html) and the picture (.png)
+    #[arg(short, long, default_value = "raywright-out")]
+    output: PathBuf,
+    /// A parameter given by -D is not searched
+    #[command(flatten)]
+    parameters: ParameterOptions,
+    #[command(flatten)]
+    run: RunOptions,
+    /// Print the whole run as one JSON object at its end
+    #[arg(long)]
+    json: bool,
+}
+
+impl TuneArgs {
+    /// A short run over a built-in scene.
+    pub(crate) fn demo(
+        scene: &str,
+        output: &Path,
+        frames: u32,
+        seed: u64,
+        run: &RunOptions,
+    ) -> Self {
+        Self {
+            scene: SceneOptions::built_in(scene),
+            frames,
+            metric: MetricOption::Total,
+            search: "nelder-mead".into(),
+            rounds: 7,
+            width: 640,
+            height: 360,
+            path_length: Integrator::DEFAULT_PATH_LENGTH,
+            seed,
+            output: output.to_owned(),
+            parameters: ParameterOptions::default(),
+            run: run.clone(),
+            json: false,
+        }
+    }
+}
+
+/// Tunes; leaves log, report and picture.
+pub(crate) fn run(args: &TuneArgs) -> Result<(), Failure> {
+    let cancel = cancel_on_interrupt()?;
+    args.run.install(|| tune(args, &cancel))
+}
+
+fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
+    let base = args.parameters.applied_to(BuildParams::default())?;
+    let stage = args.scene.prepare()?;
+    let space = ParameterSpace::new(&base, &args.parameters.names())?;
+    let settings = Settings {
+        width: args.width,
+        height: args.height,
+        path_length: args.path_length,
+        metric: match args.metric {
+            MetricOption::Render => Metric::Render,
+            MetricOption::Total => Metric::Total,
+        },
+        seed: args.seed,
+        isa: args.run.isa(),
+    };
+    if args.path_length < Integrator::DEFAULT_PATH_LENGTH {
+        output::note(
+            "note: short paths give much weight to coherent camera rays, which misleads a tuner",
+        );
+    }
+    let search = search_by_name(&args.search).expect("the option accepts the names of the tuner");
+    let mut session = Session::new(
+        &stage.world,
+        stage.camera,
+        settings,
+        space,
+        search,
+        WallClock::start(),
+    )?;
+
+    let folder = output::folder(&args.output)?;
+    let file = |ending: &str| {
+        folder.join(format!(
+            "{}-{}.{ending}",
+            stage.name,
+            settings.metric.name()
+        ))
+    };
+    let header = header(args, &stage, &settings);
+    let mut log = RunLog::create(file("jsonl"))?;
+    log.header(&header)?;
+    let mut run = RunRecord {
+        header,
+        frames: vec![],
+        summary: None,
+    };
+    search_frames(args, &mut session, &mut run, &mut log, cancel)?;
+    let searched_all = run.frames.len() == args.frames as usize;
+
+    if let Some(best) = session.incumbent() {
+        // An interrupted search is compared too, unless the user interrupts again.
+        let cancel = if searched_all {
+            cancel
+        } else {
+            &CancelToken::new()
+        };
+        let bar = output::bar(args.rounds as usize + 1, "comparing");
+        let comparison = session.compare(&best, args.rounds as usize, cancel, |done, _| {
+            bar.set_position(done as u64)
+        })?;
+        bar.finish_and_clear();
+        let summary = summary(&comparison, settings.metric, !searched_all);
+        log.summary(&summary)?;
+        if !args.json {
+            print_comparison(&summary)?;
+        }
+        run.summary = Some(summary);
+    } else {
+        output::note("no frame was finished: nothing to compare");
+    }
+    let picture = file("png");
+    write_image(&picture, &session.film().mean())?;
+    let page = file("html");
+    fs::write(&page, report::page(&run, Some(&fs::read(&picture)?)))?;
+    if args.json {
+        output::json(&run)?;
+    } else {
+        for path in [page, picture, file("jsonl")] {
+            output::line(path.display())?;
+        }
+    }
+    if searched_all && !cancel.is_cancelled() {
+        Ok(())
+    } else {
+        Err(Failure::Interrupted)
+    }
+}
+
+fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {
+    let scene = stage.world.scene();
+    RunHeader {
+        schema_version: SCHEMA_VERSION,
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: stage.name.clone(),
+        triangles: scene.triangle_count(),
+        width: settings.width,
+        height: settings.height,
+        path_length: settings.path_length,
+        metric: settings.metric.name().into(),
+        search: args.search.clone(),
+        seed: settings.seed,
+        threads: rayon::current_num_threads(),
+        instruction_set: settings.isa.name().into(),
+        frames_planned: args.frames as usize,
+        indicators: Indicators::of(scene, &stage.camera)
+            .named()
+            .map(|(name, value)| (name.into(), value))
+            .collect(),
+    }
+}
+
+/// Renders the frames of the search, each logged when it is done.
+fn search_frames(
+    args: &TuneArgs,
+    session: &mut Session<'_, WallClock>,
+    run: &mut RunRecord,
+    log: &mut RunLog,
+    cancel: &CancelToken,
+) -> Result<(), Failure> {
+    let metric = session.settings().metric;
+    let bar = output::bar(args.frames as usize, "tuning");
+    for frame in 0..args.frames as usize {
+        let Some(report) = session.frame(cancel)? else {
+            break;
+        };
+        let best = run.frames.last().and_then(|f| f.incumbent_cost_ms);
+        let record = frame_record(frame, &report, metric, best);
+        log.frame(&record)?;
+        if !args.json {
+            bar.suspend(|| output::line(frame_line(&record)))?;
+        }
+        run.frames.push(record);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+fn frame_record(
+    frame: usize,
+    report: &FrameReport,
+    metric: Metric,
+    best: Option<f64>,
+) -> FrameRecord {
+    let times = report.outcome.as_ref().ok();
+    let cost_ms = times.map(|times| milliseconds(metric.cost(times.build, times.render)));
+    FrameRecord {
+        frame,
+        config: tune::described(&report.params),
+        build_ms: times.map(|times| milliseconds(times.build)),
+        render_ms: times.map(|times| milliseconds(times.render)),
+        cost_ms,
+        failure: report.outcome.as_ref().err().map(ToString::to_string),
+        incumbent_cost_ms: match (best, cost_ms) {
+            (Some(best), Some(cost)) => Some(best.min(cost)),
+            (best, cost) => best.or(cost),
+        },
+        is_incumbent: report.is_incumbent,
+    }
+}
+
+/// One frame on one line; a star marks a new incumbent.
+fn frame_line(record: &FrameRecord) -> String {
+    let time = |ms: Option<f64>| ms.map_or_else(|| "-".into(), |ms| format!("{ms:.1}"));
+    let config: Vec<String> = record
+        .config
+        .iter()
+        .map(|(name, value)| format!("{name}={value}"))
+        .collect();
+    format!(
+        "{:>4}{} build {:>7} render {:>7} cost {:>7} best {:>7} ms  {}{}",
+        record.frame,
+        if record.is_incumbent { '*' } else { ' ' },
+        time(record.build_ms),
+        time(record.render_ms),
+        time(record.cost_ms),
+        time(record.incumbent_cost_ms),
+        config.join(" "),
+        record
+            .failure
+            .as_ref()
+            .map_or_else(String::new, |failure| format!("  failed: {failure}")),
+    )
+}
+
+fn summary(comparison: &Comparison, metric: Metric, interrupted: bool) -> RunSummary {
+    let tuned = comparison.rows[0].costs_ms(metric);
+    let rows = comparison.rows.iter().map(|row| {
+        let costs = row.costs_ms(metric);
+        let ratios: Vec<f64> = costs
+            .iter()
+            .zip(&tuned)
+            .map(|(cost, tuned)| cost / tuned)
+            .collect();
+        let builds: Vec<f64> = row
+            .rounds
+            .iter()
+            .map(|times| milliseconds(times.build))
+            .collect();
+        let renders: Vec<f64> = row
+            .rounds
+            .iter()
+            .map(|times| milliseconds(times.render))
+            .collect();
+        Some(ComparisonRow {
+            name: row.name.into(),
+            config: tune::described(&row.params),
+            build_ms: spread(&builds)?,
+            render_ms: spread(&renders)?,
+            cost_ms: spread(&costs)?,
+            cost_ratio_to_tuned: spread(&ratios)?,
+        })
+    });
+    RunSummary {
+        rounds: tuned.len(),
+        comparison: rows.flatten().collect(),
+        interrupted,
+    }
+}
+
+/// Median and quartiles, interpolated between neighbours; `None` of nothing.
+fn spread(values: &[f64]) -> Option<Spread> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().checked_sub(1)?;
+    let quantile = |q: f64| {
+        let place = q * last as f64;
+        let (below, share) = (place as usize, place.fract());
+        sorted[below] + (sorted[(below + 1).min(last)] - sorted[below]) * share
+    };
+    Some(Spread {
+        median: quantile(0.5),
+        lower: quantile(0.25),
+        upper: quantile(0.75),
+    })
+}
+
+fn print_comparison(summary: &RunSummary) -> Result<(), Failure> {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_FULL_CONDENSED);
+    table.set_header([
+        "",
+        "build ms",
+        "render ms",
+        "cost ms",
+        "cost ÷ tuned (quartiles)",
+    ]);
+    for row in &summary.comparison {
+        table.add_row([
+            row.name.clone(),
+            format!("{:.1}", row.build_ms.median),
+            format!("{:.1}", row.render_ms.median),
+            format!("{:.1}", row.cost_ms.median),
+            format!(
+                "{:.3} ({:.3} … {:.3})",
+                row.cost_ratio_to_tuned.median,
+                row.cost_ratio_to_tuned.lower,
+                row.cost_ratio_to_tuned.upper
+            ),
+        ]);
+    }
+    output::line(format_args!(
+        "\n{table}\n{} rounds in turns, medians; above 1, tuning won\n",
+        summary.rounds
+    ))?;
+    let Some(tuned) = summary.comparison.first() else {
+        return Ok(());
+    };
+    let config: Vec<String> = tuned
+        .config
+        .iter()
+        .map(|(name, value)| format!("{name}={value}"))
+        .collect();
+    output::line(format_args!("tuned: {}\n", config.join(" ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_are_interpolated() {
+        let got = spread(&[4.0, 1.0, 3.0, 2.0]).unwrap();
+        assert_eq!((got.lower, got.median, got.upper), (1.75, 2.5, 3.25));
+        assert_eq!(spread(&[]), None);
+        assert_eq!(
+            spread(&[7.0]).map(|s| (s.lower, s.median, s.upper)),
+            Some((7.0, 7.0, 7.0))
+        );
+    }
+}

@@ -1,0 +1,240 @@
+//! What the frames of a run say, sorted for the page: what was measured, what failed, what was best.
+//!
+//! A frame counts as measured if its cost is a finite number, and as failed otherwise: every frame
+//! is one or the other, so nothing is lost between the tables.
+
+use crate::report::record::FrameRecord;
+
+/// A measured frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trial<'a> {
+    pub(super) frame: &'a FrameRecord,
+    pub(super) cost_ms: f64,
+    /// Share of the measured frames that cost less: 0 for the best. Ranks and not costs are shown
+    /// as colours, since one slow configuration would press all others into one colour.
+    pub(super) rank: f64,
+}
+
+/// A configuration, with all frames that tried it.
+#[derive(Clone, Debug)]
+pub(super) struct Configuration<'a> {
+    /// The frame with the lowest cost.
+    pub(super) best: Trial<'a>,
+    /// How many frames measured it.
+    pub(super) measurements: usize,
+}
+
+/// A reason to fail, with the numbers of its frames.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Failure {
+    pub(super) reason: String,
+    pub(super) frames: Vec<usize>,
+}
+
+/// The measured frames in their order.
+pub(super) fn measured(frames: &[FrameRecord]) -> Vec<Trial<'_>> {
+    let costs = sorted_costs(frames);
+    let others = costs.len().saturating_sub(1).max(1) as f64;
+    frames
+        .iter()
+        .filter_map(|frame| {
+            let cost_ms = finite_cost(frame)?;
+            let lower = costs.partition_point(|&cost| cost < cost_ms);
+            Some(Trial {
+                frame,
+                cost_ms,
+                rank: lower as f64 / others,
+            })
+        })
+        .collect()
+}
+
+/// The failed frames by reason, the most frequent first.
+pub(super) fn failures(frames: &[FrameRecord]) -> Vec<Failure> {
+    let mut failures: Vec<Failure> = Vec::new();
+    for frame in frames.iter().filter(|frame| finite_cost(frame).is_none()) {
+        let reason = match (&frame.failure, frame.cost_ms) {
+            (Some(reason), _) => reason.as_str(),
+            (None, Some(_)) => "the cost is not a finite number",
+            (None, None) => "no cost was measured",
+        };
+        match failures.iter_mut().find(|known| known.reason == reason) {
+            Some(known) => known.frames.push(frame.frame),
+            None => failures.push(Failure {
+                reason: reason.to_string(),
+                frames: vec![frame.frame],
+            }),
+        }
+    }
+    failures.sort_by_key(|failure| std::cmp::Reverse(failure.frames.len()));
+    failures
+}
+
+/// The different configurations, the one with the lowest cost first.
+pub(super) fn configurations<'a>(trials: &[Trial<'a>]) -> Vec<Configuration<'a>> {
+    let mut order = trials.to_vec();
+    // Equal configurations side by side, the cheapest of each first.
+    order.sort_by(|one, other| {
+        let by_cost = one.cost_ms.total_cmp(&other.cost_ms);
+        one.frame.config.cmp(&other.frame.config).then(by_cost)
+    });
+    let mut configurations: Vec<Configuration<'a>> = order
+        .chunk_by(|one, other| one.frame.config == other.frame.config)
+        .map(|group| Configuration {
+            best: group[0],
+            measurements: group.len(),
+        })
+        .collect();
+    configurations.sort_by(|one, other| {
+        let by_frame = one.best.frame.frame.cmp(&other.best.frame.frame);
+        one.best
+            .cost_ms
+            .total_cmp(&other.best.cost_ms)
+            .then(by_frame)
+    });
+    configurations
+}
+
+/// The names of all parameters, in the order in which they appear.
+pub(super) fn parameters<'a>(
+    configs: impl IntoIterator<Item = &'a Vec<(String, String)>>,
+) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (name, _) in configs.into_iter().flatten() {
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    names
+}
+
+/// The value of a parameter.
+pub(super) fn value_of<'a>(config: &'a [(String, String)], name: &str) -> Option<&'a str> {
+    config
+        .iter()
+        .find(|(known, _)| known == name)
+        .map(|(_, value)| value.as_str())
+}
+
+/// The costs at the quarters of the ranks: lowest, lower quartile, median, upper quartile, highest.
+/// One value if all are equal, none if nothing was measured.
+pub(super) fn quarters(frames: &[FrameRecord]) -> Vec<f64> {
+    let costs = sorted_costs(frames);
+    match (costs.first(), costs.last()) {
+        (Some(first), Some(last)) if first < last => (0..=4)
+            .map(|quarter| costs[(quarter * (costs.len() - 1) + 2) / 4])
+            .collect(),
+        (Some(first), _) => vec![*first],
+        _ => Vec::new(),
+    }
+}
+
+fn finite_cost(frame: &FrameRecord) -> Option<f64> {
+    frame.cost_ms.filter(|cost| cost.is_finite())
+}
+
+fn sorted_costs(frames: &[FrameRecord]) -> Vec<f64> {
+    let mut costs: Vec<f64> = frames.iter().filter_map(finite_cost).collect();
+    costs.sort_by(f64::total_cmp);
+    costs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    fn with_costs(costs: &[f64]) -> Vec<FrameRecord> {
+        costs
+            .iter()
+            .enumerate()
+            .map(|(index, &cost)| {
+                let mut frame = example::frame(index);
+                frame.cost_ms = Some(cost);
+                frame.failure = None;
+                frame
+            })
+            .collect()
+    }
+
+    fn ranks(costs: &[f64]) -> Vec<f64> {
+        let frames = with_costs(costs);
+        measured(&frames).iter().map(|trial| trial.rank).collect()
+    }
+
+    #[test]
+    fn ranks_go_from_zero_to_one() {
+        assert_eq!(ranks(&[30.0, 10.0, 20.0]), [1.0, 0.0, 0.5]);
+        assert_eq!(ranks(&[5.0]), [0.0]);
+        assert_eq!(ranks(&[7.0, 7.0, 7.0]), [0.0, 0.0, 0.0]);
+        assert_eq!(ranks(&[]), [0.0; 0]);
+    }
+
+    #[test]
+    fn every_frame_is_measured_or_failed() {
+        let mut frames = example::run(80).frames;
+        frames[3].cost_ms = Some(f64::NAN);
+        frames[4].cost_ms = None;
+        let failed: usize = failures(&frames)
+            .iter()
+            .map(|failure| failure.frames.len())
+            .sum();
+        assert_eq!(measured(&frames).len() + failed, frames.len());
+        assert!(measured(&frames).iter().all(|trial| trial.rank <= 1.0));
+    }
+
+    #[test]
+    fn failures_are_counted_by_reason() {
+        let mut frames = with_costs(&[1.0, 1.0, 1.0, 1.0, f64::INFINITY]);
+        for (index, reason) in [(0, "rare"), (1, "often"), (3, "often")] {
+            frames[index].cost_ms = None;
+            frames[index].failure = Some(reason.to_string());
+        }
+        let found: Vec<(String, Vec<usize>)> = failures(&frames)
+            .into_iter()
+            .map(|failure| (failure.reason, failure.frames))
+            .collect();
+        assert_eq!(
+            found,
+            [
+                ("often".to_string(), vec![1, 3]),
+                ("rare".to_string(), vec![0]),
+                ("the cost is not a finite number".to_string(), vec![4]),
+            ]
+        );
+    }
+
+    #[test]
+    fn equal_configurations_are_one_with_its_lowest_cost() {
+        let mut frames = with_costs(&[30.0, 10.0, 20.0, 25.0]);
+        frames[2].config = frames[0].config.clone();
+        let trials = measured(&frames);
+        let found: Vec<(usize, usize)> = configurations(&trials)
+            .iter()
+            .map(|configuration| (configuration.best.frame.frame, configuration.measurements))
+            .collect();
+        assert_eq!(found, [(1, 1), (2, 2), (3, 1)]);
+    }
+
+    #[test]
+    fn parameters_of_all_configurations_are_found_once() {
+        let config = |names: &[&str]| -> Vec<(String, String)> {
+            names
+                .iter()
+                .map(|name| (name.to_string(), "1".to_string()))
+                .collect()
+        };
+        let configs = [config(&["b", "a"]), config(&["a", "c"])];
+        assert_eq!(parameters(&configs), ["b", "a", "c"]);
+        assert_eq!(value_of(&configs[0], "a"), Some("1"));
+        assert_eq!(value_of(&configs[0], "c"), None);
+    }
+
+    #[test]
+    fn quarters_of_the_costs() {
+        let frames = with_costs(&[5.0, 1.0, 3.0, 2.0, 4.0]);
+        assert_eq!(quarters(&frames), [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(quarters(&with_costs(&[2.0, 2.0])), [2.0]);
+        assert_eq!(quarters(&[]), [0.0; 0]);
+    }
+}

@@ -1,0 +1,14 @@
+//! The tuning loop of BVH parameters: the glue between tree, path tracer and tuner.
+//!
+//! The way of a frame, after Herveau, Pfaffe, Tillmann, Tichy, Dachsbacher, *Analysis of
+//! Acceleration Structure Parameters and Hybrid Autotuning for Ray Tracing*, section 3.3: ask the
+//! tuner, build, render one sample per pixel, tell the tuner what it cost. The tracer does not
+//! know that a tuner exists; the tuner is told numbers and knows no rays. The clock is an argument.
+
+mod comparison;
+mod session;
+mod space;
+
+pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
+pub use session::{Clock, FrameReport, Metric, Session, SessionError, Settings, WallClock};
+pub use space::{ParameterSpace, SpaceFault, described};

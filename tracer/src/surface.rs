@@ -1,0 +1,179 @@
+//! The point that a ray hits, known well enough to start the next ray from it.
+//!
+//! There is no epsilon: the point is formed from the barycentric weights in f64 and rounded once,
+//! so that it lies within half an ulp per coordinate of the triangle's plane; a ray starts beyond
+//! the error that is left (after the bounds of Pharr, Jakob, Humphreys, *Physically Based
+//! Rendering*, 4th ed., 2023, section 6.8). Invariant: a ray that leaves a triangle on one side
+//! does not hit it again.
+
+use raywright_bvh::{Hit, Ray, TriangleMesh, Vec3};
+
+/// The unit roundoff of f32.
+const UNIT_ROUNDOFF: f32 = 1.0 / (1 << 24) as f32;
+
+/// Roundings in the numerator of the distance to a triangle's plane, `N · (v0 − o)`, one of them
+/// in `v0 − o` (robustness bound γ₈), and one for the vertices' own scaling and difference.
+const PLANE_DISTANCE_ERROR: f32 = 9.0 * UNIT_ROUNDOFF;
+
+/// A point on a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// Where it is.
+    pub position: Vec3,
+    /// Unit geometric normal, by counter-clockwise winding.
+    pub normal: Vec3,
+    /// How far from `position` along the normal the triangle can seem to be.
+    error: f32,
+}
+
+impl Surface {
+    /// The point that a hit names.
+    ///
+    /// # Panics
+    /// If `mesh` is not the mesh that was hit.
+    #[must_use]
+    #[inline]
+    pub fn of_hit(mesh: &TriangleMesh, hit: &Hit) -> Self {
+        Self::at(
+            mesh.corners(hit.primitive_id),
+            [1.0 - hit.u - hit.v, hit.u, hit.v],
+        )
+    }
+
+    /// The point of a triangle with the given weights of its corners.
+    #[inline]
+    pub(crate) fn at(corners: [Vec3; 3], weights: [f32; 3]) -> Self {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let [_, u, v] = weights.map(f64::from);
+        let (ab, ac) = (b - a, c - a);
+        let position = (a + ab * u + ac * v).as_vec3();
+        let normal = ab.cross(ac).normalize_or_zero().as_vec3();
+        // Along every axis the largest of all: the plane's own coordinate may be exactly 0, where
+        // an error of its own size would be none.
+        let extent = corners
+            .iter()
+            .map(|&corner| (corner - position).abs().max_element())
+            .fold(0.0, f32::max);
+        let error = position.abs() * UNIT_ROUNDOFF + Vec3::splat(extent * PLANE_DISTANCE_ERROR);
+        Self {
+            position,
+            normal,
+            error: normal.abs().dot(error),
+        }
+    }
+
+    /// The normal on the side that `direction` points to.
+    #[must_use]
+    #[inline]
+    pub fn normal_towards(&self, direction: Vec3) -> Vec3 {
+        if self.normal.dot(direction) < 0.0 {
+            -self.normal
+        } else {
+            self.normal
+        }
+    }
+
+    /// A point on the side that `direction` points to, from which the triangle is behind.
+    #[must_use]
+    #[inline]
+    pub fn offset_towards(&self, direction: Vec3) -> Vec3 {
+        let normal = self.normal_towards(direction);
+        let moved = self.position + normal * self.error;
+        // The sum may have been rounded back by half an ulp.
+        Vec3::from_array(std::array::from_fn(|axis| {
+            let at = moved[axis];
+            if normal[axis] > 0.0 {
+                at.next_up()
+            } else if normal[axis] < 0.0 {
+                at.next_down()
+            } else {
+                at
+            }
+        }))
+    }
+
+    /// A ray without end from the surface.
+    #[must_use]
+    #[inline]
+    pub fn ray_towards(&self, direction: Vec3) -> Ray {
+        Ray::new(self.offset_towards(direction), direction)
+    }
+
+    /// The segment between two surfaces, neither of them included.
+    #[must_use]
+    #[inline]
+    pub fn segment_to(&self, other: &Self) -> Ray {
+        let between = other.position - self.position;
+        let origin = self.offset_towards(between);
+        let target = other.offset_towards(-between);
+        Ray::new(origin, target - origin).with_range(0.0, 1.0 - f32::EPSILON)
+    }
+
+    /// The segment to a point in space.
+    #[must_use]
+    #[inline]
+    pub fn segment_to_point(&self, point: Vec3) -> Ray {
+        let origin = self.offset_towards(point - self.position);
+        Ray::new(origin, point - origin).with_range(0.0, 1.0 - f32::EPSILON)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use raywright_bvh::{BuildParams, Bvh};
+
+    use super::*;
+
+    fn vector() -> impl Strategy<Value = Vec3> {
+        prop::array::uniform3(-1f32..1.0).prop_map(Vec3::from)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        #[test]
+        fn a_ray_that_leaves_does_not_hit_again(
+            corners in prop::array::uniform3(vector()), shift in vector(), far in 0f32..1e5, exponent in -40i32..40,
+            weights in prop::array::uniform2(0f32..1.0), direction in vector(),
+        ) {
+            let scale = 2f32.powi(exponent);
+            let corners = corners.map(|c| (c + shift * far) * scale);
+            let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+            let surface = Surface::at(corners, crate::sampling::uniform_triangle(weights));
+            prop_assume!(surface.normal != Vec3::ZERO && direction != Vec3::ZERO);
+            let bvh = Bvh::build(&[&mesh], &BuildParams::default()).unwrap();
+            for direction in [direction, -direction, surface.normal, -surface.normal] {
+                prop_assert!(bvh.closest_hit(&surface.ray_towards(direction)).is_none(), "{direction}");
+            }
+        }
+
+        /// Coordinates that are exactly 0 have no rounding error of their own.
+        #[test]
+        fn nor_from_axis_parallel_planes_through_the_origin(
+            corners in prop::array::uniform3(prop::array::uniform2(-3i8..=3)), axis in 0usize..3, height in 0i8..2,
+            exponent in -60i32..60, weights in prop::array::uniform2(0f32..1.0), direction in vector(),
+        ) {
+            let corners = corners.map(|[a, b]| {
+                let mut corner = [f32::from(height); 3];
+                (corner[(axis + 1) % 3], corner[(axis + 2) % 3]) = (f32::from(a), f32::from(b));
+                Vec3::from(corner) * 2f32.powi(exponent)
+            });
+            let surface = Surface::at(corners, crate::sampling::uniform_triangle(weights));
+            prop_assume!(surface.normal != Vec3::ZERO && direction != Vec3::ZERO);
+            let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+            let bvh = Bvh::build(&[&mesh], &BuildParams::default()).unwrap();
+            for direction in [direction, -direction, surface.normal, -surface.normal] {
+                prop_assert!(bvh.closest_hit(&surface.ray_towards(direction)).is_none(), "{direction}");
+            }
+        }
+
+        #[test]
+        fn the_offset_is_a_few_roundings(corners in prop::array::uniform3(vector()), weights in prop::array::uniform2(0f32..1.0)) {
+            let surface = Surface::at(corners, crate::sampling::uniform_triangle(weights));
+            prop_assume!(surface.normal != Vec3::ZERO);
+            let moved = surface.offset_towards(surface.normal).distance(surface.position);
+            prop_assert!(moved < 4e-6, "{moved}");
+        }
+    }
+}
