@@ -367,7 +367,7 @@ fn twice_the_light_is_twice_the_picture() {
         .mean();
     let mut scene = golden_scene.world.scene().clone();
     for material in &mut scene.materials {
-        material.emission = material.emission * 2.0;
+        material.emission *= 2.0;
     }
     golden_scene.world = World::new(scene);
     let twice = golden_scene

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use clap::Args;
 use raywright::{
-    bvh::{BuildParams, Vec3},
+    bvh::{BuildParams, Bvh, Vec3},
     imaging::Camera,
-    tracer::{World, automatic_camera, generate, load::load_scene},
+    tracer::{World, automatic_camera, dark_distance, generate, load::load_scene},
 };
 
 use super::{Failure, output};
@@ -25,9 +25,9 @@ pub(crate) struct SceneOptions {
     /// Full vertical field of view, in degrees
     #[arg(long, value_name = "DEGREES")]
     fov: Option<f32>,
-    /// Add a point light at the camera, for rooms that no sky reaches
+    /// Add a sky and a sun to a scene that has lights of its own
     #[arg(long)]
-    headlight: bool,
+    sky: bool,
 }
 
 /// A scene that is ready.
@@ -49,7 +49,7 @@ impl SceneOptions {
             camera_origin: None,
             camera_target: None,
             fov: None,
-            headlight: false,
+            sky: false,
         }
     }
 
@@ -74,18 +74,25 @@ impl SceneOptions {
                 (stem(path), loaded.scene)
             }
         };
-        if self.headlight {
-            // The light needs the camera, which may need a tree: chosen before the lights are.
-            let camera = self.camera(&World::new(scene.clone()), scene.camera)?;
-            scene.add_headlight(&camera);
-            scene.camera = Some(camera);
+        let dark = scene.is_dark();
+        if dark {
+            notes.push("the scene has no lights: it gets a sky and a sun".into());
         }
-        if scene.light_if_dark() {
-            notes.push("the scene has no lights: it gets a sky and a sun (--headlight adds a light at the camera)".into());
+        if dark || self.sky {
+            scene.add_sky();
         }
-        let scene_camera = scene.camera;
-        let world = World::new(scene);
-        let camera = self.camera(&world, scene_camera)?;
+        let mut world = World::new(scene);
+        let tree = world.build_tree(&BuildParams::default(), &mut Default::default())?;
+        let camera = self.camera(&world, &tree)?;
+        if let Some(distance) = dark_distance(&world, &tree, &camera).filter(|_| dark) {
+            notes.push(
+                "the sky hardly reaches what the camera sees: a light at the camera is added"
+                    .into(),
+            );
+            let mut scene = world.scene().clone();
+            scene.add_headlight(&camera, distance);
+            world = World::new(scene);
+        }
         for note in &notes {
             output::note(format_args!("note: {note}"));
         }
@@ -97,8 +104,8 @@ impl SceneOptions {
         })
     }
 
-    fn camera(&self, world: &World, of_scene: Option<Camera>) -> Result<Camera, Failure> {
-        let mut camera = match (self.camera_origin, self.camera_target, of_scene) {
+    fn camera(&self, world: &World, tree: &Bvh) -> Result<Camera, Failure> {
+        let mut camera = match (self.camera_origin, self.camera_target, world.scene().camera) {
             (Some(origin), Some(target), _) => Camera {
                 origin,
                 target,
@@ -106,10 +113,7 @@ impl SceneOptions {
                 vertical_fov_degrees: 60.0,
             },
             (_, _, Some(camera)) => camera,
-            _ => {
-                let tree = world.build_tree(&BuildParams::default(), &mut Default::default())?;
-                automatic_camera(world, &tree)
-            }
+            _ => automatic_camera(world, tree),
         };
         camera.vertical_fov_degrees = self.fov.unwrap_or(camera.vertical_fov_degrees);
         camera.validate()?;

@@ -7,9 +7,9 @@
 use std::time::Duration;
 
 use raywright_bvh::BuildParams;
-use raywright_imaging::{CancelToken, Film};
+use raywright_imaging::CancelToken;
 
-use super::session::{Clock, FrameTimes, Session, SessionError};
+use super::session::{Clock, FrameTimes, Rendered, Session, SessionError};
 
 /// A fixed configuration to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,11 +94,10 @@ impl<C: Clock> Session<'_, C> {
                     .stage
                     .build(&rows[row].params)
                     .map_err(SessionError::Build)?;
-                let settings = &self.stage.settings;
-                let mut film =
-                    Film::new(settings.width, settings.height).map_err(SessionError::Film)?;
-                let Some(render) = self.stage.render(&tree, &mut film, round as u32, cancel)?
-                else {
+                let rendered = self
+                    .stage
+                    .render(&tree, round as u32, Duration::MAX, cancel)?;
+                let Rendered::Finished { time: render, .. } = rendered else {
                     return Ok(Comparison { rows });
                 };
                 times[row] = Some(FrameTimes { build, render });

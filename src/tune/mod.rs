@@ -10,5 +10,8 @@ mod session;
 mod space;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
-pub use session::{Clock, FrameReport, Metric, Session, SessionError, Settings, WallClock};
+pub use session::{
+    Clock, FrameReport, FrameTimes, Metric, SLOWEST_TRIAL, Session, SessionError, Settings,
+    TrialFailure, WallClock,
+};
 pub use space::{ParameterSpace, SpaceFault, described};

@@ -1,20 +1,25 @@
 //! One tuning run: a scene, a camera, a tuner, and the frames that are rendered on the way.
 //!
 //! Invariants: what the tuner decides depends on seed and told costs alone; the picture depends on
-//! seed and number of frames alone, never on which configurations were tried. Each frame renders
-//! the next sample of every pixel, so that the search leaves a finished picture behind.
+//! seed and number of finished frames alone, never on which configurations were tried. Each frame
+//! renders the next sample of every pixel, so that the search leaves a finished picture behind. No
+//! trial takes longer than [`SLOWEST_TRIAL`] times a frame with default parameters: a tree that
+//! the depth limit has robbed of its heuristic can be a thousand times slower.
 
 use std::time::Duration;
 
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
 use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
-use raywright_tracer::{Integrator, Shot, World};
+use raywright_tracer::{Integrator, Rgb, Shot, World};
 use raywright_tuner::{Outcome, Search, TellError, Tuner};
 
 use super::space::ParameterSpace;
 
+/// Trials are given up after so many times the render time of the default parameters.
+pub const SLOWEST_TRIAL: u32 = 10;
+
 /// Tells how much time has passed since some moment.
-pub trait Clock {
+pub trait Clock: Sync {
     /// Time since a moment that does not change.
     fn now(&self) -> Duration;
 }
@@ -118,10 +123,32 @@ impl std::error::Error for SessionError {}
 pub struct FrameReport {
     /// The parameters that were tried.
     pub params: BuildParams,
-    /// How long it took, or why no tree was built.
-    pub outcome: Result<FrameTimes, BuildError>,
+    /// How long it took, or why it has no result.
+    pub outcome: Result<FrameTimes, TrialFailure>,
     /// Whether it became the incumbent.
     pub is_incumbent: bool,
+}
+
+/// Why a trial has no result.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TrialFailure {
+    /// No tree could be built.
+    Build(BuildError),
+    /// Rendering was given up.
+    TooSlow,
+}
+
+impl std::fmt::Display for TrialFailure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Build(error) => error.fmt(f),
+            Self::TooSlow => write!(
+                f,
+                "given up: over {SLOWEST_TRIAL} times slower than the default parameters"
+            ),
+        }
+    }
 }
 
 /// How long a frame took.
@@ -156,14 +183,14 @@ impl<C: Clock> Stage<'_, C> {
         ))
     }
 
-    /// Renders one sample of every pixel; the time that it took, or `None` if it was cancelled.
+    /// Renders one sample of every pixel into a film of its own.
     pub(super) fn render(
         &self,
         tree: &Bvh,
-        film: &mut Film,
         sample: u32,
+        limit: Duration,
         cancel: &CancelToken,
-    ) -> Result<Option<Duration>, SessionError> {
+    ) -> Result<Rendered, SessionError> {
         let shot = Shot {
             world: self.world,
             camera: self.camera,
@@ -172,13 +199,36 @@ impl<C: Clock> Stage<'_, C> {
             },
             seed: self.settings.seed,
         };
+        let mut film =
+            Film::new(self.settings.width, self.settings.height).map_err(SessionError::Film)?;
+        let stop = CancelToken::new();
         let start = self.clock.now();
-        let tiles = TileLoop::new().with_cancel(cancel);
-        let completion = shot
-            .render(film, sample..sample + 1, &tiles, |_| tree)
-            .map_err(SessionError::Camera)?;
-        Ok((completion == Completion::Finished).then(|| self.clock.now() - start))
+        let completion = shot.render(
+            &mut film,
+            sample..sample + 1,
+            &TileLoop::new().with_cancel(&stop),
+            |_| {
+                if cancel.is_cancelled() || self.clock.now() - start > limit {
+                    stop.cancel();
+                }
+                tree
+            },
+        );
+        let time = self.clock.now() - start;
+        Ok(match completion.map_err(SessionError::Camera)? {
+            Completion::Finished => Rendered::Finished { film, time },
+            Completion::Cancelled { .. } if cancel.is_cancelled() => Rendered::Cancelled,
+            Completion::Cancelled { .. } => Rendered::TooSlow,
+        })
     }
+}
+
+/// How the rendering of a frame ended.
+#[derive(Debug)]
+pub(super) enum Rendered {
+    Finished { film: Film, time: Duration },
+    TooSlow,
+    Cancelled,
 }
 
 /// A tuning run.
@@ -188,7 +238,10 @@ pub struct Session<'a, C> {
     space: ParameterSpace,
     tuner: Tuner,
     film: Film,
-    samples: u32,
+    /// Frames that are in the film.
+    finished: u32,
+    /// Longest time that a trial may take to render; known after the first frame.
+    limit: Option<Duration>,
 }
 
 impl<'a, C: Clock> Session<'a, C> {
@@ -222,55 +275,90 @@ impl<'a, C: Clock> Session<'a, C> {
             space,
             tuner,
             film,
-            samples: 0,
+            finished: 0,
+            limit: None,
         })
     }
 
-    /// Asks, builds, renders, tells. `None` if `cancel` was set before the frame was done; the
-    /// film keeps the samples that were rendered.
+    /// Asks, builds, renders, tells. The first frame is preceded by one with default parameters,
+    /// which is no trial and sets the limit for all. `None` if `cancel` was set before the frame
+    /// was done.
     ///
     /// # Errors
     /// If the tuner refuses the measurement.
     pub fn frame(&mut self, cancel: &CancelToken) -> Result<Option<FrameReport>, SessionError> {
-        let trial = self.tuner.ask();
-        let params = self.space.params(&trial.config);
-        let (tree, build) = match self.stage.build(&params) {
-            Ok(built) => built,
-            Err(error) => {
-                let outcome = Outcome::Failed {
-                    reason: error.to_string(),
-                };
-                self.tuner
-                    .tell(trial.id, outcome)
-                    .map_err(SessionError::Tell)?;
-                return Ok(Some(FrameReport {
-                    params,
-                    outcome: Err(error),
-                    is_incumbent: false,
-                }));
+        let limit = match self.limit {
+            Some(limit) => limit,
+            None => {
+                let (tree, _) = self
+                    .stage
+                    .build(&BuildParams::default())
+                    .map_err(SessionError::Build)?;
+                match self.stage.render(&tree, 0, Duration::MAX, cancel)? {
+                    Rendered::Finished { time, .. } => *self.limit.insert(time * SLOWEST_TRIAL),
+                    Rendered::TooSlow | Rendered::Cancelled => return Ok(None),
+                }
             }
         };
-        let Some(render) = self
-            .stage
-            .render(&tree, &mut self.film, self.samples, cancel)?
-        else {
-            self.tuner
-                .tell(trial.id, Outcome::Cancelled)
-                .map_err(SessionError::Tell)?;
-            return Ok(None);
+        let trial = self.tuner.ask();
+        let params = self.space.params(&trial.config);
+        let trial_result = match self.stage.build(&params) {
+            Err(error) => Err(TrialFailure::Build(error)),
+            Ok((tree, build)) => match self.stage.render(&tree, self.finished, limit, cancel)? {
+                Rendered::Finished { film, time } => Ok((
+                    film,
+                    FrameTimes {
+                        build,
+                        render: time,
+                    },
+                )),
+                Rendered::TooSlow => Err(TrialFailure::TooSlow),
+                Rendered::Cancelled => {
+                    self.tuner
+                        .tell(trial.id, Outcome::Cancelled)
+                        .map_err(SessionError::Tell)?;
+                    return Ok(None);
+                }
+            },
         };
-        self.samples += 1;
-        let cost = self.stage.settings.metric.cost(build, render).as_secs_f64();
+        let (outcome, told) = match trial_result {
+            Ok((film, times)) => {
+                self.add(&film);
+                let cost = self
+                    .stage
+                    .settings
+                    .metric
+                    .cost(times.build, times.render)
+                    .as_secs_f64();
+                (Ok(times), Outcome::Done { cost })
+            }
+            Err(failure) => {
+                let reason = failure.to_string();
+                (Err(failure), Outcome::Failed { reason })
+            }
+        };
         let told = self
             .tuner
-            .tell(trial.id, Outcome::Done { cost })
+            .tell(trial.id, told)
             .map_err(SessionError::Tell)?;
-        let outcome = Ok(FrameTimes { build, render });
         Ok(Some(FrameReport {
             params,
             outcome,
             is_incumbent: told.is_incumbent,
         }))
+    }
+
+    /// Adds the samples of a finished frame to the picture.
+    fn add(&mut self, frame: &Film) {
+        let completion = TileLoop::new().run(&mut self.film, |tile, view| {
+            for (x, y) in tile.pixels() {
+                // One sample: its mean is the sample, and f32 again.
+                let sample = frame.pixel(x, y).mean().map(|channel| channel as f32);
+                view.pixel_mut(x, y).add(Rgb::from(sample));
+            }
+        });
+        debug_assert_eq!(completion, Completion::Finished);
+        self.finished += 1;
     }
 
     /// The best parameters so far.
@@ -281,7 +369,7 @@ impl<'a, C: Clock> Session<'a, C> {
             .map(|record| self.space.params(&record.config))
     }
 
-    /// The picture so far: one sample per pixel for every frame.
+    /// The picture so far: one sample per pixel for every finished frame.
     #[must_use]
     pub fn film(&self) -> &Film {
         &self.film

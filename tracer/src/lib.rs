@@ -36,5 +36,5 @@ pub use raywright_imaging as imaging;
 pub use render::Shot;
 pub use scene::{Light, Material, Mesh, Rgb, Scene, Sides};
 pub use surface::Surface;
-pub use viewpoint::automatic_camera;
+pub use viewpoint::{automatic_camera, dark_distance};
 pub use world::{Needs, World};

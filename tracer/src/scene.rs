@@ -162,28 +162,23 @@ impl Scene {
                 .all(|mesh| !self.materials[mesh.material].is_emissive())
     }
 
-    /// Adds a clear sky and a high sun if nothing emits light; says whether it did.
-    pub fn light_if_dark(&mut self) -> bool {
-        let dark = self.is_dark();
-        if dark {
-            self.lights.extend([
-                Light::Constant {
-                    radiance: Rgb::new(0.6, 0.8, 1.2),
-                },
-                Light::Directional {
-                    direction: Vec3::new(0.35, -1.0, 0.22),
-                    irradiance: Rgb::new(9.0, 8.0, 6.5),
-                },
-            ]);
-        }
-        dark
+    /// Adds a clear sky and a high sun.
+    pub fn add_sky(&mut self) {
+        self.lights.extend([
+            Light::Constant {
+                radiance: Rgb::new(0.6, 0.8, 1.2),
+            },
+            Light::Directional {
+                direction: Vec3::new(0.35, -1.0, 0.22),
+                irradiance: Rgb::new(9.0, 8.0, 6.5),
+            },
+        ]);
     }
 
-    /// Adds a point light where the camera stands, strong enough to light what is half the scene's
-    /// diagonal away.
-    pub fn add_headlight(&mut self, camera: &Camera) {
-        let reach = self.bounds().diagonal() * 0.5;
-        let intensity = Rgb::splat(std::f32::consts::PI * reach * reach);
+    /// Adds a point light where the camera stands, which lights grey surfaces `distance` away as
+    /// a sky of radiance 1 would.
+    pub fn add_headlight(&mut self, camera: &Camera, distance: f32) {
+        let intensity = Rgb::splat(std::f32::consts::PI * distance * distance);
         self.lights.push(Light::Point {
             position: camera.origin,
             intensity,
