@@ -2,7 +2,7 @@
 //!
 //! Candidates stand on a lattice inside the scene's box, where the scene surrounds them, and
 //! around the bulk of the triangles; a coarse picture of each is scored: the number of distinct
-//! triangles, less for rays that leave the scene, for a wall close by, for surfaces seen from
+//! triangles, less for a wall close by, for surfaces seen from
 //! behind (a camera inside a solid), and for what the sky does not reach. Deterministic; costs
 //! some hundred thousand rays.
 
@@ -202,7 +202,7 @@ impl View {
         // opening, still has a best view.
         let front = 1.05 - self.from_behind;
         let lit = LIT + self.lit;
-        self.triangles * self.hits * close * front * lit
+        self.triangles * close * close * front * lit
     }
 }
 
