@@ -241,37 +241,37 @@ fn a_cornell_k1() {
 
 #[test]
 fn a_cornell_k2() {
-    check("a_cornell", 2, 449, 449);
+    check("a_cornell", 2, 128, 449);
 }
 
 #[test]
 fn a_cornell_k3() {
-    check("a_cornell", 3, 256, 544);
+    check("a_cornell", 3, 128, 544);
 }
 
 #[test]
 fn a_cornell_k8() {
-    check("a_cornell", 8, 201, 201);
+    check("a_cornell", 8, 64, 201);
 }
 
 #[test]
 fn c_sponza_point_k1() {
-    check("c_sponza_point", 1, 64, 19);
+    check("c_sponza_point", 1, 19, 19);
 }
 
 #[test]
 fn c_sponza_point_k3() {
-    check("c_sponza_point", 3, 85, 85);
+    check("c_sponza_point", 3, 32, 85);
 }
 
 #[test]
 fn d_sponza_sky_k1() {
-    check("d_sponza_sky", 1, 380, 95);
+    check("d_sponza_sky", 1, 64, 95);
 }
 
 #[test]
 fn d_sponza_sky_k3() {
-    check("d_sponza_sky", 3, 71, 71);
+    check("d_sponza_sky", 3, 24, 71);
 }
 
 #[test]

@@ -142,8 +142,9 @@ impl ZTest {
             format!("E: deviation of blocks {deviation:.3}"),
         );
         check(largest <= 5.0, format!("E: largest block {largest:.2}"));
+        // One block of a small picture may be above 3 by chance.
         check(
-            share <= 0.015,
+            share <= (1.0 / self.block_count as f64).max(0.015),
             format!("E: share of blocks above 3 is {share:.4}"),
         );
         check(

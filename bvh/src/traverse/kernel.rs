@@ -202,6 +202,37 @@ impl<L> BoxLanes<L> {
     }
 }
 
+/// Follows a reference down to a leaf, the first child in order before the others, which wait on
+/// the stack. `None` if the ray enters no further box.
+///
+/// A node of which one child is entered (two of three are) is left without touching the stack:
+/// the way through memory is the longest part of a step.
+#[inline(always)]
+fn descend<const N: usize, const W: usize, L: Lanes<N>, C: Count>(
+    tree: &Tree<N, W>,
+    boxes: &BoxLanes<L>,
+    mut reference: ChildRef,
+    t_max: f32,
+    order: impl Fn(&Node<N, W>) -> u32,
+    stack: &mut Stack,
+    count: &mut C,
+) -> Option<ChildRef> {
+    while !reference.is_leaf() {
+        count.node();
+        let node = &tree.nodes[reference.0 as usize];
+        let (enter, mask) = boxes.test(node, t_max);
+        reference = if mask & mask.wrapping_sub(1) != 0 {
+            enter.push_children(mask, &node.children, order(node), stack);
+            ChildRef(stack.pop()?.0)
+        } else if mask != 0 {
+            ChildRef(node.children[mask.trailing_zeros() as usize & (N - 1)])
+        } else {
+            return None;
+        };
+    }
+    Some(reference)
+}
+
 /// The closest hit, equal distances decided by the lowest id.
 #[inline(always)]
 pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: Count>(
@@ -227,15 +258,19 @@ pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, 
         if distance > best.t {
             continue;
         }
-        let reference = ChildRef(reference);
-        if !reference.is_leaf() {
-            count.node();
-            let node = &tree.nodes[reference.0 as usize];
-            let (enter, mask) = boxes.test(node, best.t);
-            enter.push_children(mask, &node.children, node.order(ray.octant), &mut stack);
+        let order = |node: &Node<N, W>| node.order(ray.octant);
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            best.t,
+            order,
+            &mut stack,
+            count,
+        ) else {
             continue;
-        }
-        for block in &tree.blocks[reference.blocks()] {
+        };
+        for block in &tree.blocks[leaf.blocks()] {
             count.block();
             let hits = triangles.test(ray, block, best.t);
             if hits.mask != 0 {
@@ -291,15 +326,19 @@ pub(crate) fn any<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: C
         ray.t_min,
     );
     while let Some((reference, _)) = stack.pop() {
-        let reference = ChildRef(reference);
-        if !reference.is_leaf() {
-            count.node();
-            let node = &tree.nodes[reference.0 as usize];
-            let (enter, mask) = boxes.test(node, ray.t_max);
-            enter.push_children(mask, &node.children, Node::<N, W>::SLOT_ORDER, &mut stack);
+        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            ray.t_max,
+            order,
+            &mut stack,
+            count,
+        ) else {
             continue;
-        }
-        for block in &tree.blocks[reference.blocks()] {
+        };
+        for block in &tree.blocks[leaf.blocks()] {
             count.block();
             if triangles.test(ray, block, ray.t_max).mask != 0 {
                 return true;
