@@ -1,2 +1,10 @@
-//! What the benchmarks share.
+//! What the benchmarks share: rays as a path tracer shoots them, measurement in turns, tables.
+//!
+//! Method: engines trace the same rays in the same order; results are compared before times are
+//! believed; rounds are taken in turns, beginning with another engine each time; a figure is the
+//! ratio to the first engine within a round, as median and quartiles. Times are wall time of one
+//! thread: run on a quiet machine.
 #![forbid(unsafe_code)]
+
+pub mod rays;
+pub mod turns;

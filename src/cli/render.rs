@@ -27,7 +27,7 @@ enum Show {
     GeometryIds,
     /// One colour per triangle
     PrimitiveIds,
-    /// Nodes visited by camera rays, white at 128
+    /// Nodes visited by camera rays, white at 64
     Nodes,
 }
 

@@ -29,7 +29,7 @@ impl View {
     ];
 
     /// So many nodes and more are white in [`View::Nodes`].
-    pub const MOST_NODES: u64 = 128;
+    pub const MOST_NODES: u64 = 64;
 
     /// Its name on a command line.
     #[must_use]

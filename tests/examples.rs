@@ -1,0 +1,68 @@
+//! The examples run to their end and print what they promise. `cargo test` builds them beside the
+//! tests; where only this test was built, it says so.
+
+#![cfg(feature = "cli")]
+
+use std::process::Command;
+
+/// Runs an example in an empty folder; what it printed.
+fn run(name: &str) -> Option<String> {
+    let tests = std::env::current_exe().expect("a path");
+    let example = tests.parent()?.parent()?.join("examples").join(name);
+    if !example.exists() {
+        eprintln!("skipped: {name} was not built");
+        return None;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = Command::new(example)
+        .current_dir(folder.path())
+        .output()
+        .expect("it runs");
+    assert!(
+        output.status.success(),
+        "{name}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Some(String::from_utf8(output.stdout).expect("text"))
+}
+
+#[test]
+fn one_ray() {
+    let Some(printed) = run("01_one_ray") else {
+        return;
+    };
+    assert!(
+        printed.contains("hit triangle 0 of mesh 0 at t = 3"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("anything nearer than 2.9: false"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn a_picture() {
+    let Some(printed) = run("03_a_picture") else {
+        return;
+    };
+    assert!(
+        printed.contains(&format!("Finished: {} samples", 320 * 240 * 64)),
+        "{printed}"
+    );
+}
+
+#[test]
+fn tune_a_build() {
+    let Some(printed) = run("05_tune_a_build") else {
+        return;
+    };
+    let costs: Vec<f64> = printed
+        .lines()
+        .filter_map(|line| line.trim().split(' ').next()?.parse().ok())
+        .collect();
+    assert!(
+        costs.len() > 1 && costs.is_sorted_by(|a, b| a >= b),
+        "incumbents only get better: {printed}"
+    );
+}
