@@ -42,13 +42,14 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
-    /// Length of the diagonal; 0 for the empty box.
+    /// Length of the diagonal; 0 for the empty box. Squares are taken in f64, where they cannot
+    /// overflow.
     #[must_use]
     pub fn diagonal(&self) -> f32 {
         if self.is_empty() {
             0.0
         } else {
-            self.min.distance(self.max)
+            self.min.as_dvec3().distance(self.max.as_dvec3()) as f32
         }
     }
 
@@ -56,5 +57,22 @@ impl Aabb {
     #[must_use]
     pub fn centre(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn empty_and_huge_boxes_have_a_diagonal() {
+        assert_eq!(Aabb::EMPTY.diagonal(), 0.0);
+        assert!(Aabb::EMPTY.is_empty());
+        for length in [1e-30_f32, 1.0, 1e30] {
+            let bounds = Aabb::EMPTY
+                .extended_by(Vec3::ZERO)
+                .extended_by(Vec3::new(length, 0.0, 0.0));
+            assert_eq!(bounds.diagonal(), length);
+        }
     }
 }

@@ -24,7 +24,7 @@ use crate::{
 /// Bound S of the magnitude of scaled coordinates.
 pub(crate) const COORDINATE_BOUND: f32 = 2.0;
 
-/// Smaller components of a direction whose largest lies in 1..2 act as this in box tests.
+/// Smaller components of a direction whose largest lies in 1/2..2 act as this in box tests.
 const SMALLEST_COMPONENT: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// Origins farther away than this, in units of [`COORDINATE_BOUND`], hit nothing: the products of
@@ -35,7 +35,7 @@ const FARTHEST_ORIGIN: f32 = (1u64 << 60) as f32;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RaySetup {
     pub(crate) origin: [f32; 3],
-    /// Scaled by a power of two so that the largest magnitude lies in 1..2.
+    /// Scaled by a power of two so that the largest magnitude lies in 1/2..2.
     pub(crate) direction: [f32; 3],
     pub(crate) reciprocal: [f32; 3],
     pub(crate) triangle_pad: [f32; 3],
@@ -66,13 +66,7 @@ impl RaySetup {
         if !usable {
             return None;
         }
-        // A subnormal direction is lifted first: its power of two has no reciprocal in f32.
-        let lift = if largest < f32::MIN_POSITIVE {
-            (1u32 << 24) as f32
-        } else {
-            1.0
-        };
-        let direction_scale = power_of_two_below(largest * lift).recip();
+        let [direction_scale, lift] = direction_scale(largest);
         let direction = ray.direction * lift * direction_scale;
         let reciprocal = direction.to_array().map(|d| {
             if d.abs() < SMALLEST_COMPONENT {
@@ -87,7 +81,7 @@ impl RaySetup {
         });
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
         let unscale = [direction_scale, lift / scale];
-        let scaled = |t: f32| t * (scale / lift) * direction_scale.recip();
+        let scaled = |t: f32| t / unscale[1] / unscale[0];
         Some(Self {
             origin: origin.to_array(),
             direction: direction.to_array(),
@@ -106,6 +100,23 @@ impl RaySetup {
     #[inline]
     pub(crate) fn unscaled(&self, t: f32) -> f32 {
         t * self.unscale[0] * self.unscale[1]
+    }
+}
+
+/// Two powers of two whose product brings the largest component of a direction into 1/2..2, where
+/// most are already: no power of two changes a bit of what follows, but divisions take time.
+#[inline]
+fn direction_scale(largest: f32) -> [f32; 2] {
+    if (0.5..2.0).contains(&largest) {
+        [1.0, 1.0]
+    } else {
+        // A subnormal direction is lifted first: its power of two has no reciprocal in f32.
+        let lift = if largest < f32::MIN_POSITIVE {
+            (1u32 << 24) as f32
+        } else {
+            1.0
+        };
+        [power_of_two_below(largest * lift).recip(), lift]
     }
 }
 
