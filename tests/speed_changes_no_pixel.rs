@@ -213,3 +213,41 @@ fn tiles_may_be_traced_through_different_trees() {
         .collect();
     assert_eq!(bits, stage.picture(&eight, PATHS, 32));
 }
+
+/// What `canonical` says is the same, is the same: a tuner need not try it twice.
+#[test]
+fn equal_canonical_parameters_build_equal_trees() {
+    let stage = Stage::new("interior");
+    let mut numbers = Numbers(23);
+    let mut workspace = Default::default();
+    for _ in 0..20 {
+        let params = random_params(&mut numbers);
+        let mut variant = params;
+        variant.sah_block_size = 1 << params.sah_block_size.ilog2();
+        variant.min_leaf_size = params.min_leaf_size.min(params.max_leaf_size);
+        let factor = [0.25, 0.5, 2.0, 8.0][numbers.below(4) as usize];
+        variant.traversal_cost = params.traversal_cost * factor;
+        variant.intersection_cost = params.intersection_cost * factor;
+        if params.intersection_cost > 0.0 {
+            assert_eq!(params.canonical(), variant.canonical());
+        }
+        let mut tree = |params: &BuildParams| stage.world.build_tree(params, &mut workspace);
+        let (Ok(tree), Ok(other)) = (tree(&params), tree(&variant)) else {
+            continue;
+        };
+        let figures = |tree: &Bvh| {
+            let stats = tree.stats();
+            (
+                stats.nodes,
+                stats.leaves,
+                stats.depth,
+                stats.largest_leaf,
+                stats.sah_nodes,
+                stats.sah_blocks,
+            )
+        };
+        assert_eq!(figures(&tree), figures(&other), "{params:?} {variant:?}");
+        let nodes = |tree: &Bvh| stage.picture(tree, Integrator::View(View::Nodes), 32);
+        assert_eq!(nodes(&tree), nodes(&other), "{params:?} {variant:?}");
+    }
+}

@@ -27,10 +27,13 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a picture of a scene
+    #[command(after_long_help = run_options::parameter_help())]
     Render(render::RenderArgs),
     /// Search BVH parameters while frames of a scene are rendered
+    #[command(after_long_help = run_options::parameter_help())]
     Tune(tune::TuneArgs),
     /// Show counts, bounds, indicators and tree statistics of a scene
+    #[command(after_long_help = run_options::parameter_help())]
     Inspect(inspect::InspectArgs),
     /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
     Demo(demo::DemoArgs),

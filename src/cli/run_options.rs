@@ -2,7 +2,7 @@
 
 use clap::Args;
 use raywright::{
-    bvh::{BuildParams, Isa, PARAMETERS},
+    bvh::{BuildParams, Isa, PARAMETERS, ParameterRange},
     imaging::CancelToken,
 };
 
@@ -50,7 +50,7 @@ fn isa(name: &str) -> Result<Isa, String> {
 /// BVH parameters on a command line.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct ParameterOptions {
-    /// Set a BVH parameter, for example -D branching_factor=4; may be repeated
+    /// Set a BVH parameter, for example -D branching_factor=4; may be repeated (tune does not search it then)
     #[arg(short = 'D', value_name = "NAME=VALUE")]
     parameters: Vec<String>,
 }
@@ -90,6 +90,34 @@ impl ParameterOptions {
                 None => (text.trim(), None),
             })
     }
+}
+
+/// The parameter table, for help.
+pub(crate) fn parameter_help() -> String {
+    let default = BuildParams::default();
+    let rows = PARAMETERS.iter().map(|parameter| {
+        let range = match parameter.range {
+            ParameterRange::Integers(min, max) => format!("{min}..={max}"),
+            ParameterRange::Reals(min, max) => format!("{min}..={max} (real)"),
+            ParameterRange::OneOf(values) => values
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join("|"),
+            ParameterRange::Words(_, built) => built.join("|"),
+        };
+        let value = default
+            .get(parameter.name)
+            .map_or_else(String::new, |value| value.to_string());
+        format!(
+            "  {:<18} {:<16} [{value}] {}\n",
+            parameter.name, range, parameter.meaning
+        )
+    });
+    format!(
+        "BVH parameters for -D: what is built today, [default], meaning\n{}",
+        rows.collect::<String>()
+    )
 }
 
 /// Advice for a name that is none: the nearest one that is.

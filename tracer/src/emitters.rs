@@ -41,8 +41,8 @@ struct MeshEmitter {
 pub(crate) struct LightSample {
     /// Unit vector towards the light.
     pub(crate) direction: Vec3,
-    /// Radiance, or irradiance of a perpendicular surface for lights without extent, divided by
-    /// the probability (density) of the choice.
+    /// Radiance, or irradiance of a perpendicular surface for lights without extent; of a sample,
+    /// divided by the probability (density) of the choice.
     pub(crate) value: Rgb,
     /// Probability density per solid angle; `None` for lights that no ray can hit by chance.
     pub(crate) density: Option<f32>,
@@ -166,28 +166,13 @@ impl Emitters {
                     shadow_ray: at.segment_to(&point),
                 })
             }
-            Emitter::Point {
-                position,
-                intensity,
-            } => {
-                let between = *position - at.position;
-                let distance_squared = between.length_squared();
-                (distance_squared > 0.0).then(|| LightSample {
-                    direction: between / distance_squared.sqrt(),
-                    value: *intensity / (distance_squared * probability),
-                    density: None,
-                    shadow_ray: at.segment_to_point(*position),
+            emitter => {
+                let light = emitter.without_extent(at)?;
+                Some(LightSample {
+                    value: light.value / probability,
+                    ..light
                 })
             }
-            Emitter::Directional {
-                towards,
-                irradiance,
-            } => Some(LightSample {
-                direction: *towards,
-                value: *irradiance / probability,
-                density: None,
-                shadow_ray: at.ray_towards(*towards),
-            }),
         }
     }
 
@@ -217,30 +202,41 @@ impl Emitters {
     /// All lights without extent, with what arrives at a surface that faces them: for the naive
     /// integrator, which makes no choice.
     pub(crate) fn without_extent(&self, at: &Surface) -> impl Iterator<Item = LightSample> {
-        self.emitters.iter().filter_map(|emitter| match emitter {
-            Emitter::Mesh(_) => None,
-            Emitter::Point {
+        self.emitters
+            .iter()
+            .filter_map(|emitter| emitter.without_extent(at))
+    }
+}
+
+impl Emitter {
+    /// What arrives from a point or a parallel light.
+    #[inline]
+    fn without_extent(&self, at: &Surface) -> Option<LightSample> {
+        match *self {
+            Self::Mesh(_) => None,
+            Self::Point {
                 position,
                 intensity,
             } => {
-                let between = *position - at.position;
-                Some(LightSample {
-                    direction: between.normalize_or_zero(),
-                    value: *intensity / between.length_squared(),
+                let between = position - at.position;
+                let distance_squared = between.length_squared();
+                (distance_squared > 0.0).then(|| LightSample {
+                    direction: between / distance_squared.sqrt(),
+                    value: intensity / distance_squared,
                     density: None,
-                    shadow_ray: at.segment_to_point(*position),
+                    shadow_ray: at.segment_to_point(position),
                 })
             }
-            Emitter::Directional {
+            Self::Directional {
                 towards,
                 irradiance,
             } => Some(LightSample {
-                direction: *towards,
-                value: *irradiance,
+                direction: towards,
+                value: irradiance,
                 density: None,
-                shadow_ray: at.ray_towards(*towards),
+                shadow_ray: at.ray_towards(towards),
             }),
-        })
+        }
     }
 }
 
