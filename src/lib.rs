@@ -2,7 +2,7 @@
 //!
 //! This crate is a facade. Each feature opens a room: [`bvh`] is always there, `tracer` brings the
 //! path tracer and its pictures, `tuner` the search of parameters, both together the tuning loop
-//! [`tune`](crate::tune), `volume` the volume raycaster, `cli` the command line and its reports.
+//! `tune`, `volume` the volume raycaster, `cli` the command line and its reports.
 //! Those who embed a tracer switch the default features off.
 //!
 //! ```

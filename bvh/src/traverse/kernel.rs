@@ -11,7 +11,7 @@
 
 use glam::Vec3;
 
-use super::triangle::{NODE_PAD, RayLanes, TRIANGLE_PAD};
+use super::triangle::{BlockHits, NODE_PAD, RayLanes, TRIANGLE_PAD};
 use crate::{
     layout::{
         node::{ChildRef, Node},
@@ -135,14 +135,6 @@ pub(crate) struct Candidate {
     pub(crate) id: u32,
 }
 
-impl Candidate {
-    /// Whether this is hit before `(t, id)`: nearer, or as near with a lower number.
-    #[inline(always)]
-    pub(crate) fn precedes(&self, t: f32, id: u32) -> bool {
-        self.t < t || (self.t == t && self.id < id)
-    }
-}
-
 /// Counts work, or does nothing at no cost.
 pub(crate) trait Count {
     fn node(&mut self);
@@ -253,10 +245,11 @@ pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, 
 ) -> Option<Candidate> {
     let boxes = BoxLanes::<L>::new(ray);
     let triangles = RayLanes::<T>::new(ray);
-    let mut best = Candidate {
+    let mut best = Best {
         t: ray.t_max,
         u: 0.0,
         v: 0.0,
+        den: 1.0,
         id: u32::MAX,
     };
     let mut stack = Stack::new();
@@ -285,40 +278,59 @@ pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, 
             count.block();
             let hits = triangles.test(ray, block, best.t);
             if hits.mask != 0 {
-                keep_best(
-                    &mut best,
-                    &hits.t.store(),
-                    &hits.u.store(),
-                    &hits.v.store(),
-                    &block.id,
-                    hits.mask,
-                );
+                best.keep_first(&hits, &block.id);
             }
         }
     }
-    (best.id != u32::MAX).then_some(best)
+    (best.id != u32::MAX).then(|| Candidate {
+        u: best.u / best.den,
+        v: best.v / best.den,
+        t: best.t,
+        id: best.id,
+    })
 }
 
-#[inline(always)]
-fn keep_best(
-    best: &mut Candidate,
-    t: &[f32; 4],
-    u: &[f32; 4],
-    v: &[f32; 4],
-    id: &[u32; 4],
-    mask: u32,
-) {
-    for lane in 0..4 {
-        let candidate = Candidate {
-            t: t[lane],
-            u: u[lane],
-            v: v[lane],
-            id: id[lane],
-        };
-        if mask >> lane & 1 == 1 && candidate.precedes(best.t, best.id) {
-            *best = candidate;
+/// The first hit so far; its weights are still to be divided by `den`.
+struct Best {
+    t: f32,
+    u: f32,
+    v: f32,
+    den: f32,
+    id: u32,
+}
+
+impl Best {
+    /// Takes over the lanes that precede it.
+    #[inline(always)]
+    fn keep_first<T: Lanes<4>>(&mut self, hits: &BlockHits<T>, ids: &[u32; 4]) {
+        let (t, u, v, den) = (
+            hits.t.store(),
+            hits.u.store(),
+            hits.v.store(),
+            hits.den.store(),
+        );
+        let mut lanes = hits.mask;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & 3;
+            lanes &= lanes - 1;
+            if precedes((t[lane], ids[lane]), (self.t, self.id)) {
+                *self = Self {
+                    t: t[lane],
+                    u: u[lane],
+                    v: v[lane],
+                    den: den[lane],
+                    id: ids[lane],
+                };
+            }
         }
     }
+}
+
+/// Whether a hit, given by distance and number, comes before another: nearer, or as near with a
+/// lower number.
+#[inline(always)]
+pub(crate) fn precedes((t, id): (f32, u32), (other_t, other_id): (f32, u32)) -> bool {
+    t < other_t || (t == other_t && id < other_id)
 }
 
 /// Whether anything is hit.

@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::{
-    kernel::{Candidate, RaySetup},
+    kernel::{Candidate, RaySetup, precedes},
     triangle::UNIT_ROUNDOFF,
 };
 use crate::{
@@ -37,7 +37,7 @@ pub fn closest_hit(meshes: &[&TriangleMesh], ray: &Ray) -> Result<Option<Hit>, B
                 v,
                 id: first_id + primitive_id,
             };
-            if best.is_none_or(|best| candidate.precedes(best.t, best.id)) {
+            if best.is_none_or(|best| precedes((candidate.t, candidate.id), (best.t, best.id))) {
                 best = Some(candidate);
             }
         }

@@ -36,12 +36,14 @@ pub(crate) struct RayLanes<L> {
     direction: [L; 3],
 }
 
-/// The lanes of a block that a ray hits, as bits, with distance and weights.
+/// The lanes of a block that a ray hits, as bits, with distance and weights. The weights are still
+/// to be divided by `den`: only those of the last hit that is kept ever are.
 pub(crate) struct BlockHits<L> {
     pub(crate) mask: u32,
     pub(crate) t: L,
     pub(crate) u: L,
     pub(crate) v: L,
+    pub(crate) den: L,
 }
 
 impl<L: Lanes<4>> RayLanes<L> {
@@ -75,6 +77,7 @@ impl<L: Lanes<4>> RayLanes<L> {
                 t: zero,
                 u: zero,
                 v: zero,
+                den: zero,
             };
         }
         let t = dot(normal, to_vertex).xor_sign(den).div(den_abs);
@@ -84,8 +87,9 @@ impl<L: Lanes<4>> RayLanes<L> {
         BlockHits {
             mask: L::bits(hit),
             t,
-            u: u.div(den_abs),
-            v: v.div(den_abs),
+            u,
+            v,
+            den: den_abs,
         }
     }
 }
