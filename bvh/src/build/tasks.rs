@@ -31,10 +31,17 @@ pub(crate) fn join<A: Send, B: Send>(
 
 /// Whether a range of `n` is worth being divided into pieces.
 pub(crate) fn in_pieces(n: usize) -> bool {
-    #[cfg(feature = "parallel")]
-    return n >= PIECES_FROM && rayon::current_num_threads() > 1;
-    #[cfg(not(feature = "parallel"))]
-    return n >= usize::MAX;
+    n >= PIECES_FROM && threads() > 1
+}
+
+#[cfg(feature = "parallel")]
+fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+#[cfg(not(feature = "parallel"))]
+fn threads() -> usize {
+    1
 }
 
 /// Maps every piece and merges the results two by two.
