@@ -147,6 +147,27 @@ proptest! {
         check(&[&mesh], &params, &rays)?;
     }
 
+    /// Rays in the plane of a triangle up to a few roundings: all that the triangle test computes
+    /// is noise, and without the triangle's own box it would accept any distance.
+    #[test]
+    fn rays_in_the_planes_of_triangles(
+        mesh in soup(vector(1.0), 150), params in params(),
+        picks in prop::collection::vec(
+            (any::<prop::sample::Index>(), prop::array::uniform4(-0.5f32..1.5), vector(1.0), -26i32..=-18), 20),
+    ) {
+        prop_assume!(!mesh.triangles().is_empty());
+        let rays: Vec<Ray> = picks
+            .iter()
+            .map(|(index, [a, b, c, d], jitter, exponent)| {
+                let [v0, v1, v2] = mesh.corners(index.index(mesh.triangles().len()) as u32);
+                let point = |a: f32, b: f32| v0 + (v1 - v0) * a + (v2 - v0) * b;
+                let origin = point(a * 3.0, b * 3.0) + *jitter * 2f32.powi(*exponent);
+                Ray::new(origin, point(*c, *d) - origin)
+            })
+            .collect();
+        check(&[&mesh], &params, &rays)?;
+    }
+
     #[test]
     fn far_from_the_origin_and_at_any_scale(
         mesh in soup(vector(1.0), 100), params in params(), rays in rays(vector(2.0), vector(1.0)),
