@@ -291,8 +291,8 @@ fn the_closed_furnace_keeps_its_closed_form_anywhere() {
         (0.0, 1e3, 1e-4),
         (0.0, 1e6, 1e-4),
         (1_000.0, 1.0, 3e-4),
-        (10_000.0, 1.0, 3e-3),
-        (10_000.0, 1e-3, 3e-3),
+        (10_000.0, 1.0, 1e-3),
+        (10_000.0, 1e-3, 1e-3),
     ];
     for (shift, scale, deficit_allowed) in cases {
         let Some(room) = load("g2_closed_furnace", |v| (v + shift) * scale) else {
