@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     bounds::Aabb,
-    build::{BuildWorkspace, primitive::PrimitiveRef, recursion},
+    build::{BuildWorkspace, LeafReference, primitive::PrimitiveRef, recursion},
     error::BuildError,
     layout::{emit, tree::Tree},
     mesh::{MeshError, TriangleMesh},
@@ -78,15 +78,15 @@ impl Bvh {
                     PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
                 }));
         }
-        let root = recursion::build(workspace, &first_ids, params)?;
+        let root = recursion::build(workspace, params)?;
         let source = emit::Source {
             records: &workspace.records,
-            leaf_ids: &workspace.leaf_ids,
-            corners: |id: u32| {
-                let (geometry_id, primitive_id) = locate(&first_ids, id);
-                meshes[geometry_id as usize]
-                    .corners(primitive_id)
-                    .map(|v| v * scale)
+            leaves: &workspace.leaves,
+            triangle: |leaf: LeafReference| {
+                let geometry_id = leaf.geometry_id as usize;
+                let corners = meshes[geometry_id].corners(leaf.primitive_id);
+                let id = first_ids[geometry_id] + leaf.primitive_id;
+                (id, corners.map(|v| v * scale))
             },
         };
         let mut tree = AnyTree::new(params.branching_factor);
@@ -198,8 +198,8 @@ impl AnyTree {
     /// An empty tree of a branching factor that has been validated.
     fn new(branching_factor: u32) -> Self {
         match branching_factor {
-            2 => Self::Two(Tree::default()),
-            4 => Self::Four(Tree::default()),
+            ..=2 => Self::Two(Tree::default()),
+            3..=4 => Self::Four(Tree::default()),
             _ => Self::Eight(Tree::default()),
         }
     }

@@ -19,6 +19,7 @@ mod bounds;
 mod build;
 mod bvh;
 mod error;
+mod hierarchy;
 mod layout;
 mod mesh;
 mod params;
@@ -29,14 +30,15 @@ mod stats;
 mod traverse;
 
 pub use bounds::Aabb;
-pub use build::BuildWorkspace;
+pub use build::{BuildWorkspace, LeafReference};
 pub use bvh::Bvh;
 pub use error::{BuildError, ParameterFault};
 pub use glam::Vec3;
+pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
 pub use mesh::{MeshError, TriangleMesh};
 pub use params::{
     Accuracy, BuildParams, Dynamics, LeafFormat, PARAMETERS, Parameter, ParameterRange,
-    ParameterValue, Quality,
+    ParameterValue, Quality, Rounding,
 };
 pub use ray::{Hit, Ray, Work};
 pub use simd::Isa;

@@ -1,4 +1,4 @@
-//! The parameter space of a tree: eleven parameters with the meaning that they have in Embree's
+//! The parameter space of a tree. Eleven parameters have the meaning that they have in Embree's
 //! `RTCBuildArguments` and scene flags, after Table 1 of Herveau, Pfaffe, Tillmann, Tichy,
 //! Dachsbacher, *Analysis of Acceleration Structure Parameters and Hybrid Autotuning for Ray
 //! Tracing*.
@@ -12,12 +12,29 @@ use crate::error::ParameterFault;
 /// How primitives are divided into subtrees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Quality {
-    /// Along a Morton curve: fast to build, slow to trace. Not built yet.
+    /// Along a Morton curve: fastest to build, slow to trace. Block size and costs have no effect.
     Morton,
+    /// Agglomeration of near clusters along a Morton curve: between Morton and binned SAH. Not
+    /// part of Embree.
+    Agglomerative,
     /// Binned surface area heuristic.
     BinnedSah,
-    /// Binned surface area heuristic that may cut primitives in two. Not built yet.
+    /// Binned surface area heuristic that may cut primitives in two.
     SpatialSplits,
+    /// Cut primitives, optimised by reinsertion and collapsed at least cost: slowest to build,
+    /// fastest to trace. Not part of Embree.
+    Optimized,
+}
+
+/// Whose rounding the builder follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Rounding {
+    /// True floors and true divisions, and a spatial split that leaves an empty side is not held
+    /// against the primitive: what Embree's own scenes do.
+    Exact,
+    /// To the last bit that of Embree 4's builder interface (`rtcBuildBVH`), which is compiled for
+    /// SSE2: for comparisons with it.
+    Embree,
 }
 
 /// What a [`BuildWorkspace`](crate::BuildWorkspace) keeps for the next build.
@@ -99,18 +116,36 @@ pub struct Parameter {
 
 const COST_LIMIT: f32 = 1000.0;
 
-/// The eleven parameters, in the order of the paper's Table 1.
-pub const PARAMETERS: [Parameter; 11] = [
+/// The eleven parameters of the paper's Table 1 in its order, then those of this crate alone.
+pub const PARAMETERS: [Parameter; 13] = [
     Parameter {
         name: "quality",
-        range: ParameterRange::Words(&["morton", "binned-sah", "spatial-splits"], &["binned-sah"]),
-        tuned: ParameterRange::Words(&["morton", "binned-sah", "spatial-splits"], &["binned-sah"]),
+        range: ParameterRange::Words(
+            &[
+                "morton",
+                "agglomerative",
+                "binned-sah",
+                "spatial-splits",
+                "optimized",
+            ],
+            &["binned-sah"],
+        ),
+        tuned: ParameterRange::Words(
+            &[
+                "morton",
+                "agglomerative",
+                "binned-sah",
+                "spatial-splits",
+                "optimized",
+            ],
+            &["binned-sah"],
+        ),
         changes_hits: false,
         meaning: "how primitives are divided into subtrees",
     },
     Parameter {
         name: "branching_factor",
-        range: ParameterRange::OneOf(&[2, 4, 8]),
+        range: ParameterRange::Integers(2, 16),
         tuned: ParameterRange::OneOf(&[2, 4, 8]),
         changes_hits: false,
         meaning: "most children of a node",
@@ -131,14 +166,14 @@ pub const PARAMETERS: [Parameter; 11] = [
     },
     Parameter {
         name: "min_leaf_size",
-        range: ParameterRange::Integers(1, 32),
+        range: ParameterRange::Integers(1, 64),
         tuned: ParameterRange::Integers(1, 32),
         changes_hits: false,
         meaning: "so few primitives are never divided; at most max_leaf_size",
     },
     Parameter {
         name: "max_leaf_size",
-        range: ParameterRange::Integers(1, 32),
+        range: ParameterRange::Integers(1, 64),
         tuned: ParameterRange::Integers(1, 32),
         changes_hits: false,
         meaning: "more primitives are always divided",
@@ -178,6 +213,20 @@ pub const PARAMETERS: [Parameter; 11] = [
         changes_hits: true,
         meaning: "robust is watertight at edges and vertices",
     },
+    Parameter {
+        name: "split_budget",
+        range: ParameterRange::Reals(1.0, 8.0),
+        tuned: ParameterRange::Reals(1.0, 2.0),
+        changes_hits: false,
+        meaning: "most references after spatial splits, relative to the number of primitives",
+    },
+    Parameter {
+        name: "rounding",
+        range: ParameterRange::Words(&["exact", "embree"], &["exact", "embree"]),
+        tuned: ParameterRange::Words(&["exact"], &["exact"]),
+        changes_hits: false,
+        meaning: "embree follows the rounding of Embree's rtcBuildBVH to the last bit",
+    },
 ];
 
 /// What a tree is built with. Every combination of values either has a documented meaning or is an
@@ -187,16 +236,17 @@ pub const PARAMETERS: [Parameter; 11] = [
 pub struct BuildParams {
     /// How primitives are divided into subtrees.
     pub quality: Quality,
-    /// Most children of a node: 2, 4 or 8.
+    /// Most children of a node, 2..=16; fastest where it is the width of a node in memory: 2, 4,
+    /// 8 or 16.
     pub branching_factor: u32,
     /// Deepest level of the tree, the root being level 1; 1..=64. The last 8 levels are a reserve
     /// in which ranges are halved without looking at costs.
     pub max_depth: u32,
     /// Primitives that the cost model intersects at once, 1..=32; acts as the power of two below.
     pub sah_block_size: u32,
-    /// Ranges of so few primitives become leaves, 1..=32. Acts as at most `max_leaf_size`.
+    /// Ranges of so few primitives become leaves, 1..=64. Acts as at most `max_leaf_size`.
     pub min_leaf_size: u32,
-    /// Ranges of more primitives never become leaves, 1..=32.
+    /// Ranges of more primitives never become leaves, 1..=64.
     pub max_leaf_size: u32,
     /// Cost of visiting a node, in the unit of `intersection_cost`; 0..=1000.
     pub traversal_cost: f32,
@@ -208,6 +258,10 @@ pub struct BuildParams {
     pub leaf_format: LeafFormat,
     /// Which triangle test is used.
     pub accuracy: Accuracy,
+    /// Most references that spatial splits may make, relative to the number of primitives; 1..=8.
+    pub split_budget: f32,
+    /// Whose rounding the builder follows.
+    pub rounding: Rounding,
 }
 
 impl Default for BuildParams {
@@ -234,6 +288,8 @@ impl BuildParams {
             dynamics: Dynamics::Dynamic,
             leaf_format: LeafFormat::Edges,
             accuracy: Accuracy::Fast,
+            split_budget: 1.2,
+            rounding: Rounding::Exact,
         }
     }
 
@@ -248,6 +304,36 @@ impl BuildParams {
             min_leaf_size: 4,
             max_leaf_size: 28,
             ..Self::embree_api_default()
+        }
+    }
+
+    /// What Embree 4 uses for a scene of high quality on a machine with AVX.
+    #[must_use]
+    pub const fn embree_scene_high() -> Self {
+        Self {
+            quality: Quality::SpatialSplits,
+            ..Self::embree_scene_medium()
+        }
+    }
+
+    /// What Embree 4 uses for a scene with the flag `COMPACT`: nodes of four.
+    #[must_use]
+    pub const fn embree_scene_compact() -> Self {
+        Self {
+            branching_factor: 4,
+            leaf_format: LeafFormat::Compact,
+            ..Self::embree_scene_medium()
+        }
+    }
+
+    /// What Embree 4 uses for a mesh of low quality on a machine with AVX.
+    #[must_use]
+    pub const fn embree_mesh_morton() -> Self {
+        Self {
+            quality: Quality::Morton,
+            max_depth: 32,
+            max_leaf_size: 4,
+            ..Self::embree_scene_medium()
         }
     }
 
@@ -280,8 +366,10 @@ impl BuildParams {
         Some(match name {
             "quality" => Choice(match self.quality {
                 Quality::Morton => "morton",
+                Quality::Agglomerative => "agglomerative",
                 Quality::BinnedSah => "binned-sah",
                 Quality::SpatialSplits => "spatial-splits",
+                Quality::Optimized => "optimized",
             }),
             "branching_factor" => Integer(self.branching_factor),
             "max_depth" => Integer(self.max_depth),
@@ -301,6 +389,11 @@ impl BuildParams {
             "accuracy" => Choice(match self.accuracy {
                 Accuracy::Fast => "fast",
                 Accuracy::Robust => "robust",
+            }),
+            "split_budget" => Real(self.split_budget),
+            "rounding" => Choice(match self.rounding {
+                Rounding::Exact => "exact",
+                Rounding::Embree => "embree",
             }),
             _ => return None,
         })
@@ -328,8 +421,10 @@ impl BuildParams {
             "quality" => {
                 self.quality = match text {
                     "morton" => Quality::Morton,
+                    "agglomerative" => Quality::Agglomerative,
                     "binned-sah" => Quality::BinnedSah,
                     "spatial-splits" => Quality::SpatialSplits,
+                    "optimized" => Quality::Optimized,
                     _ => return Err(not_understood()),
                 }
             }
@@ -361,28 +456,48 @@ impl BuildParams {
                     _ => return Err(not_understood()),
                 }
             }
+            "split_budget" => self.split_budget = real()?,
+            "rounding" => {
+                self.rounding = match text {
+                    "exact" => Rounding::Exact,
+                    "embree" => Rounding::Embree,
+                    _ => return Err(not_understood()),
+                }
+            }
             _ => unreachable!("every name of the table has an arm"),
         }
         Ok(())
     }
 
     /// The representative of all values that build the same tree: the smaller leaf limit capped by
-    /// the larger, the block size rounded down to a power of two, and both costs divided by the
-    /// power of two that brings the intersection cost into 1..2 (exact in binary arithmetic; an
-    /// intersection cost of 0 leaves the traversal cost alone).
+    /// the larger, the block size rounded down to a power of two, both costs divided by the power
+    /// of two that brings the intersection cost into 1..2 (exact in binary arithmetic; an
+    /// intersection cost of 0 leaves the traversal cost alone), and what the quality does not look
+    /// at set to one value: block size and costs with Morton order, the split budget without
+    /// splits.
     #[must_use]
     pub fn canonical(&self) -> Self {
         let scale = match self.intersection_cost {
             c if c.is_normal() => 2f32.powi(-(exponent(c))),
             _ => 1.0,
         };
-        Self {
+        let mut canonical = Self {
             sah_block_size: 1 << self.sah_block_shift(),
             min_leaf_size: self.min_leaf_size.min(self.max_leaf_size),
             traversal_cost: self.traversal_cost * scale,
             intersection_cost: self.intersection_cost * scale,
             ..*self
+        };
+        if self.quality == Quality::Morton {
+            let default = Self::embree_api_default();
+            canonical.sah_block_size = default.sah_block_size;
+            canonical.traversal_cost = default.traversal_cost;
+            canonical.intersection_cost = default.intersection_cost;
         }
+        if !matches!(self.quality, Quality::SpatialSplits | Quality::Optimized) {
+            canonical.split_budget = Self::embree_api_default().split_budget;
+        }
+        canonical
     }
 
     /// The shift that rounds a count up to blocks: ⌊log2 `sah_block_size`⌋.
@@ -475,11 +590,11 @@ mod tests {
     fn all_faults_are_reported_at_once() {
         let params = BuildParams {
             quality: Quality::Morton,
-            branching_factor: 3,
+            branching_factor: 17,
             max_depth: 0,
             sah_block_size: 0,
             min_leaf_size: 0,
-            max_leaf_size: 33,
+            max_leaf_size: 65,
             traversal_cost: f32::NAN,
             intersection_cost: -1.0,
             leaf_format: LeafFormat::Compact,

@@ -8,12 +8,21 @@ pub(crate) mod record;
 pub(crate) mod recursion;
 pub(crate) mod tasks;
 
+/// A primitive in a leaf.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LeafReference {
+    /// Which geometry.
+    pub geometry_id: u32,
+    /// Which of its primitives.
+    pub primitive_id: u32,
+}
+
 /// The temporary memory of a build, for reuse by the next one.
 #[derive(Debug, Default)]
 pub struct BuildWorkspace {
     pub(crate) references: Vec<primitive::PrimitiveRef>,
     pub(crate) scratch: Vec<primitive::PrimitiveRef>,
-    pub(crate) leaf_ids: Vec<u32>,
+    pub(crate) leaves: Vec<LeafReference>,
     pub(crate) records: Vec<record::Record>,
 }
 
@@ -23,7 +32,7 @@ impl BuildWorkspace {
     pub fn bytes(&self) -> usize {
         (self.references.capacity() + self.scratch.capacity())
             * size_of::<primitive::PrimitiveRef>()
-            + self.leaf_ids.capacity() * size_of::<u32>()
+            + self.leaves.capacity() * size_of::<LeafReference>()
             + self.records.capacity() * size_of::<record::Record>()
     }
 }

@@ -6,6 +6,7 @@
 
 use wide::f32x4;
 
+use super::LeafReference;
 use crate::bounds::Aabb;
 
 /// A box in two registers; the fourth lanes are free.
@@ -70,6 +71,13 @@ impl PrimitiveRef {
 
     pub(crate) fn primitive_id(&self) -> u32 {
         self.0.upper.to_array()[3].to_bits()
+    }
+
+    pub(crate) fn leaf_reference(&self) -> LeafReference {
+        LeafReference {
+            geometry_id: self.geometry_id(),
+            primitive_id: self.primitive_id(),
+        }
     }
 
     /// Twice the centroid.

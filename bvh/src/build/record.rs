@@ -71,6 +71,12 @@ impl Record {
         }
     }
 
+    /// The places of its children among the records, or of its primitives among the leaves.
+    pub(crate) fn range(&self) -> std::ops::Range<usize> {
+        let first = self.first as usize;
+        first..first + self.count as usize
+    }
+
     pub(crate) fn bounds(&self) -> crate::bounds::Aabb {
         crate::bounds::Aabb {
             min: self.lower.into(),

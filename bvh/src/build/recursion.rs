@@ -7,7 +7,7 @@
 //! deeper than `max_depth`, the root being level 1.
 
 use super::{
-    BuildWorkspace,
+    BuildWorkspace, LeafReference,
     binning::{Split, find_split},
     partition,
     primitive::{PrimitiveRef, RangeBounds},
@@ -20,15 +20,11 @@ use crate::{error::BuildError, layout::triangles::BLOCK_SIZE, params::BuildParam
 const RESERVED_LEVELS: u32 = 8;
 
 /// The most children that a node can have.
-const MAX_CHILDREN: usize = 8;
-
-/// Numbers over all meshes: the number of a triangle is that of its mesh's first, plus its own.
-pub(crate) type FirstIds = [u32];
+const MAX_CHILDREN: usize = 16;
 
 /// Builds the records of a tree over `workspace.references`. Returns the root.
 pub(crate) fn build(
     workspace: &mut BuildWorkspace,
-    first_ids: &FirstIds,
     params: &BuildParams,
 ) -> Result<Option<Record>, BuildError> {
     let n = workspace.references.len();
@@ -36,18 +32,17 @@ pub(crate) fn build(
         return Ok(None);
     }
     workspace.scratch.resize(n, workspace.references[0]);
-    workspace.leaf_ids.resize(n, 0);
+    workspace.leaves.resize(n, LeafReference::default());
     workspace.records.resize(2 * n - 2, Record::UNUSED);
     let bounds = tasks::map_merge(&workspace.references, &RangeBounds::of, &RangeBounds::merge);
     let builder = Builder {
         params: params.canonical(),
         block_shift: params.sah_block_shift(),
-        first_ids,
     };
     let root = Range {
         references: &mut workspace.references,
         scratch: &mut workspace.scratch,
-        leaf_ids: &mut workspace.leaf_ids,
+        leaves: &mut workspace.leaves,
         begin: 0,
         bounds,
     };
@@ -68,7 +63,7 @@ struct Range<'a> {
     references: &'a mut [PrimitiveRef],
     /// As long as `references`; large partitions go back and forth between the two.
     scratch: &'a mut [PrimitiveRef],
-    leaf_ids: &'a mut [u32],
+    leaves: &'a mut [LeafReference],
     /// Place of the first reference among all.
     begin: usize,
     bounds: RangeBounds,
@@ -92,21 +87,21 @@ impl<'a> Range<'a> {
     fn split_at(self, middle: usize, bounds: [RangeBounds; 2]) -> [Self; 2] {
         let (references, references_right) = self.references.split_at_mut(middle);
         let (scratch, scratch_right) = self.scratch.split_at_mut(middle);
-        let (leaf_ids, leaf_ids_right) = self.leaf_ids.split_at_mut(middle);
+        let (leaves, leaves_right) = self.leaves.split_at_mut(middle);
         let begin = self.begin;
         let [left, right] = bounds;
         [
             Self {
                 references,
                 scratch,
-                leaf_ids,
+                leaves,
                 begin,
                 bounds: left,
             },
             Self {
                 references: references_right,
                 scratch: scratch_right,
-                leaf_ids: leaf_ids_right,
+                leaves: leaves_right,
                 begin: begin + middle,
                 bounds: right,
             },
@@ -139,13 +134,12 @@ impl<'a> Range<'a> {
     }
 }
 
-struct Builder<'a> {
+struct Builder {
     params: BuildParams,
     block_shift: u32,
-    first_ids: &'a FirstIds,
 }
 
-impl Builder<'_> {
+impl Builder {
     fn find_split(&self, range: &Range<'_>) -> Option<Split> {
         find_split(range.references, &range.bounds, self.block_shift)
     }
@@ -216,8 +210,8 @@ impl Builder<'_> {
             return Err(self.depth_error(n, level));
         }
         if n <= max_leaf_size {
-            for (id, reference) in range.leaf_ids.iter_mut().zip(&*range.references) {
-                *id = self.first_ids[reference.geometry_id() as usize] + reference.primitive_id();
+            for (leaf, reference) in range.leaves.iter_mut().zip(&*range.references) {
+                *leaf = reference.leaf_reference();
             }
             let blocks = n.div_ceil(BLOCK_SIZE) as u32;
             return Ok(Record::leaf(&range.bounds.geometry, range.begin, n, blocks));

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     bounds::Aabb,
     build::{
+        LeafReference,
         record::{Kind, Record},
         tasks,
     },
@@ -21,9 +22,9 @@ use crate::{
 /// Where the parts of a finished build are found.
 pub(crate) struct Source<'a, F> {
     pub(crate) records: &'a [Record],
-    pub(crate) leaf_ids: &'a [u32],
-    /// The scaled corners of a triangle, by its number over all meshes.
-    pub(crate) corners: F,
+    pub(crate) leaves: &'a [LeafReference],
+    /// Number over all meshes and scaled corners of a triangle.
+    pub(crate) triangle: F,
 }
 
 /// The part of the arrays that a subtree fills.
@@ -40,7 +41,7 @@ pub(crate) fn emit<const N: usize, const W: usize, F>(
     root: Option<&Record>,
     source: &Source<'_, F>,
 ) where
-    F: Fn(u32) -> [Vec3; 3] + Sync,
+    F: Fn(LeafReference) -> (u32, [Vec3; 3]) + Sync,
 {
     tree.nodes.clear();
     tree.blocks.clear();
@@ -62,7 +63,7 @@ pub(crate) fn emit<const N: usize, const W: usize, F>(
     }
 }
 
-impl<F: Fn(u32) -> [Vec3; 3] + Sync> Source<'_, F> {
+impl<F: Fn(LeafReference) -> (u32, [Vec3; 3]) + Sync> Source<'_, F> {
     fn node<const N: usize, const W: usize>(&self, record: &Record, slots: Slots<'_, N, W>) {
         let first = record.first as usize;
         self.children(&self.records[first..first + record.count as usize], slots);
@@ -136,10 +137,11 @@ impl<F: Fn(u32) -> [Vec3; 3] + Sync> Source<'_, F> {
 
     fn leaf(&self, record: &Record, blocks: &mut [TriangleBlock]) {
         let first = record.first as usize;
-        let ids = &self.leaf_ids[first..first + record.count as usize];
-        for (block, ids) in blocks.iter_mut().zip(ids.chunks(BLOCK_SIZE)) {
-            for (lane, &id) in ids.iter().enumerate() {
-                block.set(lane, id, (self.corners)(id));
+        let leaves = &self.leaves[first..first + record.count as usize];
+        for (block, leaves) in blocks.iter_mut().zip(leaves.chunks(BLOCK_SIZE)) {
+            for (lane, &leaf) in leaves.iter().enumerate() {
+                let (id, corners) = (self.triangle)(leaf);
+                block.set(lane, id, corners);
             }
         }
     }
