@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     bounds::Aabb,
-    build::{BuildWorkspace, LeafReference, primitive::PrimitiveRef, recursion},
+    build::{self, BuildWorkspace, LeafReference, primitive::PrimitiveRef},
     error::BuildError,
     layout::{emit, tree::Tree},
     mesh::{MeshError, TriangleMesh},
@@ -78,15 +78,18 @@ impl Bvh {
                     PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
                 }));
         }
-        let root = recursion::build(workspace, params)?;
+        let corners = |leaf: LeafReference| {
+            meshes[leaf.geometry_id as usize]
+                .corners(leaf.primitive_id)
+                .map(|v| v * scale)
+        };
+        let root = build::build(workspace, Some(corners), params)?;
         let source = emit::Source {
             records: &workspace.records,
             leaves: &workspace.leaves,
             triangle: |leaf: LeafReference| {
-                let geometry_id = leaf.geometry_id as usize;
-                let corners = meshes[geometry_id].corners(leaf.primitive_id);
-                let id = first_ids[geometry_id] + leaf.primitive_id;
-                (id, corners.map(|v| v * scale))
+                let id = first_ids[leaf.geometry_id as usize] + leaf.primitive_id;
+                (id, corners(leaf))
             },
         };
         let mut tree = AnyTree::new(params.branching_factor);

@@ -1,11 +1,11 @@
 //! Binned surface area heuristic: Wald, *On fast Construction of SAH-based Bounding Volume
 //! Hierarchies*, 2007, section 3, with the bins, costs and tie rules of Embree 4.
 //!
-//! Invariants: every reference falls in exactly one bin of each axis; only minima, maxima and
-//! counts are accumulated, so that the result does not depend on order or threads. Poor where
-//! primitives are long and diagonal.
+//! Invariants: every reference falls in exactly one bin of each axis, and the partition decides by
+//! the same rounded number as the bins did; only minima, maxima and counts are accumulated, so that
+//! the result does not depend on order or threads. Poor where primitives are long and diagonal.
 
-use wide::f32x4;
+use wide::{f32x4, i32x4};
 
 use super::{
     primitive::{Bounds, PrimitiveRef, RangeBounds},
@@ -18,6 +18,76 @@ const MAX_BINS: usize = 32;
 /// Extents of centroids up to this are taken for zero.
 const SMALLEST_EXTENT: f32 = 1e-34;
 
+/// Whose rounding is followed: how real numbers become bins, and what goes with it.
+pub(crate) trait Rounding: Copy + Send + Sync + 'static {
+    /// Taken away before rounding.
+    const SHIFT: f32;
+    /// Whether equal elements come out of a sort in the order of Embree's library.
+    const LIBRARY_ORDER: bool;
+    /// Whether a cut with an empty side takes the rest of its budget from a reference.
+    const EMPTY_SIDE_ENDS_BUDGET: bool;
+    /// 1 / x in a Morton build.
+    fn reciprocal(x: f32) -> f32;
+    fn floor(shifted: f32x4) -> i32x4;
+    /// `x - SHIFT < threshold(plane)` says whether the bin of x is below `plane`.
+    fn threshold(plane: usize) -> f32;
+}
+
+/// A true floor, of numbers that are not negative.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Exact;
+
+impl Rounding for Exact {
+    const SHIFT: f32 = 0.0;
+    const LIBRARY_ORDER: bool = false;
+    const EMPTY_SIDE_ENDS_BUDGET: bool = false;
+
+    fn reciprocal(x: f32) -> f32 {
+        1.0 / x
+    }
+
+    #[inline(always)]
+    fn floor(shifted: f32x4) -> i32x4 {
+        shifted.fast_trunc_int()
+    }
+
+    fn threshold(plane: usize) -> f32 {
+        plane as f32
+    }
+}
+
+/// The nearest whole number to x − 1/2, ties to even: Embree's builder interface, which is compiled
+/// for SSE2.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AsEmbree;
+
+impl Rounding for AsEmbree {
+    const SHIFT: f32 = 0.5;
+    const LIBRARY_ORDER: bool = true;
+    const EMPTY_SIDE_ENDS_BUDGET: bool = true;
+
+    /// The processor's estimate, whose bits are its maker's affair, and one step of Newton's.
+    fn reciprocal(x: f32) -> f32 {
+        let estimate = f32x4::splat(x).recip().to_array()[0];
+        estimate + estimate * (1.0 - x * estimate)
+    }
+
+    #[inline(always)]
+    fn floor(shifted: f32x4) -> i32x4 {
+        shifted.fast_round_int()
+    }
+
+    /// A tie at `plane` − 1/2 goes to the even neighbour, which is below the plane if that is odd.
+    fn threshold(plane: usize) -> f32 {
+        let middle = plane as f32 - 0.5;
+        if plane % 2 == 1 {
+            middle.next_up()
+        } else {
+            middle
+        }
+    }
+}
+
 /// A plane between bins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Split {
@@ -26,17 +96,23 @@ pub(crate) struct Split {
     pub(crate) plane: usize,
     /// Sum over both sides of half area × blocks.
     pub(crate) sah: f32,
-    scale: f32,
-    offset: f32,
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+    pub(crate) shift: f32,
+    pub(crate) threshold: f32,
 }
 
 impl Split {
+    /// Whether a coordinate on the axis lies in a bin on the left side.
+    #[inline(always)]
+    pub(crate) fn is_below(&self, coordinate: f32) -> bool {
+        (coordinate - self.offset) * self.scale - self.shift < self.threshold
+    }
+
     /// Whether a reference lies on the left side.
     #[inline(always)]
     pub(crate) fn is_left(&self, reference: &PrimitiveRef) -> bool {
-        let centroid = reference.doubled_centroid().to_array()[self.axis];
-        // The plane is a whole number, so comparing with it needs no rounding down.
-        (centroid - self.offset) * self.scale < self.plane as f32
+        self.is_below(reference.doubled_centroid().to_array()[self.axis])
     }
 }
 
@@ -62,11 +138,11 @@ impl Mapping {
     }
 
     #[inline(always)]
-    fn bins_of(&self, reference: &PrimitiveRef) -> [usize; 3] {
+    fn bins_of<R: Rounding>(&self, reference: &PrimitiveRef) -> [usize; 3] {
         let place = (reference.doubled_centroid() - self.offset) * self.scale;
-        let [x, y, z, _] = place.fast_trunc_int().to_array();
-        // Coordinates are finite and not below the offset: only the upper end can be passed, and
-        // the mask makes that visible to the compiler as well.
+        let [x, y, z, _] = R::floor(place - f32x4::splat(R::SHIFT)).to_array();
+        // Coordinates are not below the offset: only the upper end can be passed, and the mask
+        // makes that visible to the compiler as well.
         [x, y, z].map(|bin| (bin as usize).min(self.bins - 1) & (MAX_BINS - 1))
     }
 }
@@ -78,13 +154,13 @@ struct Bins {
 }
 
 impl Bins {
-    fn fill(mapping: &Mapping, references: &[PrimitiveRef]) -> Self {
+    fn fill<R: Rounding>(mapping: &Mapping, references: &[PrimitiveRef]) -> Self {
         let mut bins = Self {
             bounds: [[Bounds::EMPTY; MAX_BINS]; 3],
             counts: [[0; MAX_BINS]; 3],
         };
         for reference in references {
-            for (axis, bin) in mapping.bins_of(reference).into_iter().enumerate() {
+            for (axis, bin) in mapping.bins_of::<R>(reference).into_iter().enumerate() {
                 bins.bounds[axis][bin].extend(&reference.0);
                 bins.counts[axis][bin] += 1;
             }
@@ -125,37 +201,66 @@ impl Bins {
         }
         best
     }
+
+    fn best_split<R: Rounding>(&self, mapping: &Mapping, block_shift: u32) -> Option<Split> {
+        let (scale, offset) = (mapping.scale.to_array(), mapping.offset.to_array());
+        let mut best: Option<Split> = None;
+        for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
+            let (sah, plane) = self.best_plane(axis, mapping.bins, block_shift);
+            if plane != 0 && best.is_none_or(|best| sah < best.sah) {
+                best = Some(Split {
+                    axis,
+                    plane,
+                    sah,
+                    scale: scale[axis],
+                    offset: offset[axis],
+                    shift: R::SHIFT,
+                    threshold: R::threshold(plane),
+                });
+            }
+        }
+        best
+    }
+
+    fn sides(&self, split: &Split, bins: usize) -> [Bounds; 2] {
+        let mut sides = [Bounds::EMPTY; 2];
+        for (bin, bounds) in self.bounds[split.axis][..bins].iter().enumerate() {
+            sides[usize::from(bin >= split.plane)].extend(bounds);
+        }
+        sides
+    }
 }
 
 /// The cheapest plane of all axes; `None` if all centroids coincide or no plane parts them.
-pub(crate) fn find_split(
+pub(crate) fn find_split<R: Rounding>(
     references: &[PrimitiveRef],
     bounds: &RangeBounds,
     block_shift: u32,
 ) -> Option<Split> {
     let mapping = Mapping::new(references.len(), &bounds.centroid);
-    let bins = if tasks::in_pieces(references.len()) {
+    bins_of_all::<R>(&mapping, references).best_split::<R>(&mapping, block_shift)
+}
+
+/// As [`find_split`], with the boxes of both sides.
+pub(crate) fn find_split_and_sides<R: Rounding>(
+    references: &[PrimitiveRef],
+    bounds: &RangeBounds,
+    block_shift: u32,
+) -> Option<(Split, [Bounds; 2])> {
+    let mapping = Mapping::new(references.len(), &bounds.centroid);
+    let bins = bins_of_all::<R>(&mapping, references);
+    let split = bins.best_split::<R>(&mapping, block_shift)?;
+    Some((split, bins.sides(&split, mapping.bins)))
+}
+
+fn bins_of_all<R: Rounding>(mapping: &Mapping, references: &[PrimitiveRef]) -> Bins {
+    if tasks::in_pieces(references.len()) {
         tasks::map_merge(
             references,
-            &|piece| Bins::fill(&mapping, piece),
+            &|piece| Bins::fill::<R>(mapping, piece),
             &|a: Bins, b| a.merge(&b),
         )
     } else {
-        Bins::fill(&mapping, references)
-    };
-    let (scale, offset) = (mapping.scale.to_array(), mapping.offset.to_array());
-    let mut best: Option<Split> = None;
-    for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
-        let (sah, plane) = bins.best_plane(axis, mapping.bins, block_shift);
-        if plane != 0 && best.is_none_or(|best| sah < best.sah) {
-            best = Some(Split {
-                axis,
-                plane,
-                sah,
-                scale: scale[axis],
-                offset: offset[axis],
-            });
-        }
+        Bins::fill::<R>(mapping, references)
     }
-    best
 }

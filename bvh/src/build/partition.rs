@@ -19,15 +19,18 @@ pub(crate) struct Partition {
 }
 
 /// Divides in place: two pointers that walk towards each other.
-pub(crate) fn in_place(references: &mut [PrimitiveRef], split: &Split) -> Partition {
+pub(crate) fn in_place(
+    references: &mut [PrimitiveRef],
+    is_left: impl Fn(&PrimitiveRef) -> bool,
+) -> Partition {
     let (mut left, mut right) = (0, references.len());
     let mut bounds = [RangeBounds::EMPTY; 2];
     loop {
-        while left < right && split.is_left(&references[left]) {
+        while left < right && is_left(&references[left]) {
             bounds[0].extend(&references[left]);
             left += 1;
         }
-        while left < right && !split.is_left(&references[right - 1]) {
+        while left < right && !is_left(&references[right - 1]) {
             bounds[1].extend(&references[right - 1]);
             right -= 1;
         }

@@ -42,6 +42,14 @@ impl Bounds {
         dx * (dy + dz) + dy * dz
     }
 
+    #[inline(always)]
+    pub(crate) fn intersection(&self, other: &Self) -> Self {
+        Self {
+            lower: self.lower.fast_max(other.lower),
+            upper: self.upper.fast_min(other.upper),
+        }
+    }
+
     pub(crate) fn to_aabb(self) -> Aabb {
         let corner = |v: f32x4| glam::Vec3::from_slice(&v.to_array()[..3]);
         Aabb {
@@ -50,6 +58,11 @@ impl Bounds {
         }
     }
 }
+
+const BUDGET_SHIFT: u32 = 27;
+
+/// Geometry ids from this on leave no room for a budget of cuts.
+pub(crate) const CUT_ID_LIMIT: u32 = 1 << BUDGET_SHIFT;
 
 /// A primitive's box; the fourth lanes carry the geometry id and the primitive id as bits.
 #[derive(Clone, Copy, Debug)]
@@ -71,6 +84,39 @@ impl PrimitiveRef {
 
     pub(crate) fn primitive_id(&self) -> u32 {
         self.0.upper.to_array()[3].to_bits()
+    }
+
+    /// How often it may still be cut in two, in the top bits of the geometry id: for builds that
+    /// cut, whose geometry ids are below [`CUT_ID_LIMIT`].
+    #[inline(always)]
+    pub(crate) fn budget(&self) -> u32 {
+        self.geometry_id() >> BUDGET_SHIFT
+    }
+
+    pub(crate) fn with_budget(&self, budget: u32) -> Self {
+        self.part(&self.0, budget)
+    }
+
+    /// A part of the primitive, in a smaller box.
+    #[inline(always)]
+    pub(crate) fn part(&self, bounds: &Bounds, budget: u32) -> Self {
+        let mut lower = bounds.lower.to_array();
+        let mut upper = bounds.upper.to_array();
+        let geometry_id = self.geometry_id() & (CUT_ID_LIMIT - 1) | budget << BUDGET_SHIFT;
+        lower[3] = f32::from_bits(geometry_id);
+        upper[3] = f32::from_bits(self.primitive_id());
+        Self(Bounds {
+            lower: f32x4::new(lower),
+            upper: f32x4::new(upper),
+        })
+    }
+
+    /// Its ids in a build that cuts.
+    pub(crate) fn cut_leaf_reference(&self) -> LeafReference {
+        LeafReference {
+            geometry_id: self.geometry_id() & (CUT_ID_LIMIT - 1),
+            primitive_id: self.primitive_id(),
+        }
     }
 
     pub(crate) fn leaf_reference(&self) -> LeafReference {

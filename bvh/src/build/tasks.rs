@@ -60,3 +60,44 @@ pub(crate) fn map_merge<T: Sync, R: Send>(
     );
     merge(left, right)
 }
+
+/// Treats the items piece by piece.
+pub(crate) fn for_each_piece<T: Send>(items: &mut [T], treat: &(impl Fn(&mut [T]) + Sync)) {
+    if items.len() <= PIECE_SIZE {
+        return treat(items);
+    }
+    let (left, right) = items.split_at_mut(items.len() / 2);
+    join(
+        || for_each_piece(left, treat),
+        || for_each_piece(right, treat),
+    );
+}
+
+/// Fills each result from its job, at the same time where jobs are large. A failure of an earlier
+/// job hides those of later ones.
+pub(crate) fn fill_from_jobs<J: Send, T: Send, E: Send>(
+    jobs: &mut [Option<J>],
+    results: &mut [T],
+    size: &(impl Fn(&J) -> usize + Sync),
+    run: &(impl Fn(J) -> Result<T, E> + Sync),
+) -> Result<(), E> {
+    if let ([job], [result]) = (&mut *jobs, &mut *results) {
+        if let Some(job) = job.take() {
+            *result = run(job)?;
+        }
+        return Ok(());
+    }
+    let total: usize = jobs.iter().flatten().map(size).sum();
+    let middle = jobs.len() / 2;
+    let (jobs_a, jobs_b) = jobs.split_at_mut(middle);
+    let (results_a, results_b) = results.split_at_mut(middle);
+    if total < TASK_SIZE {
+        fill_from_jobs(jobs_a, results_a, size, run)?;
+        return fill_from_jobs(jobs_b, results_b, size, run);
+    }
+    let (a, b) = join(
+        || fill_from_jobs(jobs_a, results_a, size, run),
+        || fill_from_jobs(jobs_b, results_b, size, run),
+    );
+    a.and(b)
+}
