@@ -8,8 +8,12 @@
 use wide::{f32x4, i32x4};
 
 use super::{
-    primitive::{Bounds, PrimitiveRef, RangeBounds},
+    primitive::{Bounds, BoxLanes, PrimitiveRef, RangeBounds, THREE_LANES},
     tasks,
+};
+use crate::simd::{
+    self, Isa,
+    build::{EightLanes, Halves},
 };
 
 /// The most bins; Embree's object splitter has 32.
@@ -89,7 +93,7 @@ impl Rounding for AsEmbree {
 }
 
 /// A plane between bins.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Split {
     pub(crate) axis: usize,
     /// The first bin on the right.
@@ -100,6 +104,8 @@ pub(crate) struct Split {
     pub(crate) offset: f32,
     pub(crate) shift: f32,
     pub(crate) threshold: f32,
+    /// The boxes of both sides.
+    pub(crate) sides: [Bounds; 2],
 }
 
 impl Split {
@@ -112,7 +118,7 @@ impl Split {
     /// Whether a reference lies on the left side.
     #[inline(always)]
     pub(crate) fn is_left(&self, reference: &PrimitiveRef) -> bool {
-        self.is_below(reference.doubled_centroid().to_array()[self.axis])
+        self.is_below(reference.doubled_centroid_on(self.axis))
     }
 }
 
@@ -120,6 +126,8 @@ impl Split {
 #[derive(Clone, Copy, Debug)]
 struct Mapping {
     bins: usize,
+    /// The number of the last bin.
+    last: f32x4,
     scale: f32x4,
     offset: f32x4,
 }
@@ -127,52 +135,94 @@ struct Mapping {
 impl Mapping {
     fn new(n: usize, centroid: &Bounds) -> Self {
         let bins = ((4.0 + 0.05 * n as f32) as usize).min(MAX_BINS);
-        let extent = (centroid.upper - centroid.lower).to_array();
         let spread = 0.99 * bins as f32;
-        let scale = extent.map(|e| if e > SMALLEST_EXTENT { spread / e } else { 0.0 });
+        let scale = centroid
+            .extent()
+            .to_array()
+            .map(|e| if e > SMALLEST_EXTENT { spread / e } else { 0.0 });
         Self {
             bins,
+            last: f32x4::splat((bins - 1) as f32),
             scale: f32x4::new(scale),
-            offset: centroid.lower,
+            offset: centroid.lower() & THREE_LANES,
         }
     }
 
     #[inline(always)]
-    fn bins_of<R: Rounding>(&self, reference: &PrimitiveRef) -> [usize; 3] {
-        let place = (reference.doubled_centroid() - self.offset) * self.scale;
-        let [x, y, z, _] = R::floor(place - f32x4::splat(R::SHIFT)).to_array();
-        // Coordinates are not below the offset: only the upper end can be passed, and the mask
-        // makes that visible to the compiler as well.
-        [x, y, z].map(|bin| (bin as usize).min(self.bins - 1) & (MAX_BINS - 1))
+    fn bins_of<R: Rounding>(&self, centroid: f32x4) -> [usize; 3] {
+        let place = (centroid - self.offset) * self.scale - f32x4::splat(R::SHIFT);
+        // Coordinates are not below the offset: only the upper end can be passed.
+        let [x, y, z, _] = R::floor(place.fast_min(self.last)).to_array();
+        // The mask tells the compiler that no index leaves the arrays.
+        [x, y, z].map(|bin| bin as usize & (MAX_BINS - 1))
     }
 }
 
-#[derive(Clone)]
-struct Bins {
-    bounds: [[Bounds; MAX_BINS]; 3],
-    counts: [[u32; MAX_BINS]; 3],
+/// The bins of the three axes side by side, of which the first few are in use: memory that is
+/// reused from range to range.
+#[derive(Clone, Debug)]
+pub(crate) struct Bins {
+    bounds: [[Bounds; 3]; MAX_BINS],
+    counts: [[u32; 4]; MAX_BINS],
+}
+
+impl Default for Bins {
+    fn default() -> Self {
+        Self {
+            bounds: [[Bounds::EMPTY; 3]; MAX_BINS],
+            counts: [[0; 4]; MAX_BINS],
+        }
+    }
+}
+
+/// Adds references to cleared bins.
+struct Fill<'a, R> {
+    bins: &'a mut Bins,
+    mapping: &'a Mapping,
+    references: &'a [PrimitiveRef],
+    rounding: std::marker::PhantomData<R>,
+}
+
+impl<R: Rounding> EightLanes for Fill<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Halves>(self) {
+        let mapping = *self.mapping;
+        for reference in self.references {
+            let lanes = L::of(&reference.0);
+            let bins = mapping.bins_of::<R>(reference.doubled_centroid());
+            for (axis, bin) in bins.into_iter().enumerate() {
+                let bounds = &mut self.bins.bounds[bin][axis];
+                *bounds = L::of(bounds).min(lanes).to_bounds();
+                self.bins.counts[bin][axis] += 1;
+            }
+        }
+    }
 }
 
 impl Bins {
-    fn fill<R: Rounding>(mapping: &Mapping, references: &[PrimitiveRef]) -> Self {
-        let mut bins = Self {
-            bounds: [[Bounds::EMPTY; MAX_BINS]; 3],
-            counts: [[0; MAX_BINS]; 3],
-        };
-        for reference in references {
-            for (axis, bin) in mapping.bins_of::<R>(reference).into_iter().enumerate() {
-                bins.bounds[axis][bin].extend(&reference.0);
-                bins.counts[axis][bin] += 1;
-            }
-        }
-        bins
+    fn clear(&mut self, bins: usize) {
+        self.bounds[..bins].fill([Bounds::EMPTY; 3]);
+        self.counts[..bins].fill([0; 4]);
     }
 
-    fn merge(mut self, other: &Self) -> Self {
-        for axis in 0..3 {
-            for bin in 0..MAX_BINS {
-                self.bounds[axis][bin].extend(&other.bounds[axis][bin]);
-                self.counts[axis][bin] += other.counts[axis][bin];
+    fn fill<R: Rounding>(&mut self, mapping: &Mapping, references: &[PrimitiveRef], isa: Isa) {
+        self.clear(mapping.bins);
+        let kernel = Fill::<R> {
+            bins: self,
+            mapping,
+            references,
+            rounding: std::marker::PhantomData,
+        };
+        simd::build::run(isa, kernel);
+    }
+
+    fn merge(mut self, other: &Self, bins: usize) -> Self {
+        for bin in 0..bins {
+            for axis in 0..3 {
+                self.bounds[bin][axis].extend(&other.bounds[bin][axis]);
+                self.counts[bin][axis] += other.counts[bin][axis];
             }
         }
         self
@@ -185,15 +235,15 @@ impl Bins {
         let mut right_cost = [0.0; MAX_BINS];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         for bin in (1..bins).rev() {
-            bounds.extend(&self.bounds[axis][bin]);
-            count += self.counts[axis][bin];
+            bounds.extend(&self.bounds[bin][axis]);
+            count += self.counts[bin][axis];
             right_cost[bin] = bounds.half_area() * blocks(count);
         }
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         let mut best = (f32::INFINITY, 0);
         for (plane, right_cost) in right_cost.iter().enumerate().take(bins).skip(1) {
-            bounds.extend(&self.bounds[axis][plane - 1]);
-            count += self.counts[axis][plane - 1];
+            bounds.extend(&self.bounds[plane - 1][axis]);
+            count += self.counts[plane - 1][axis];
             let cost = bounds.half_area() * blocks(count) + right_cost;
             if cost < best.0 {
                 best = (cost, plane);
@@ -216,18 +266,15 @@ impl Bins {
                     offset: offset[axis],
                     shift: R::SHIFT,
                     threshold: R::threshold(plane),
+                    sides: [Bounds::EMPTY; 2],
                 });
             }
         }
-        best
-    }
-
-    fn sides(&self, split: &Split, bins: usize) -> [Bounds; 2] {
-        let mut sides = [Bounds::EMPTY; 2];
-        for (bin, bounds) in self.bounds[split.axis][..bins].iter().enumerate() {
-            sides[usize::from(bin >= split.plane)].extend(bounds);
+        let best = best.as_mut()?;
+        for (bin, bounds) in self.bounds[..mapping.bins].iter().enumerate() {
+            best.sides[usize::from(bin >= best.plane)].extend(&bounds[best.axis]);
         }
-        sides
+        Some(*best)
     }
 }
 
@@ -236,31 +283,19 @@ pub(crate) fn find_split<R: Rounding>(
     references: &[PrimitiveRef],
     bounds: &RangeBounds,
     block_shift: u32,
+    isa: Isa,
+    bins: &mut Bins,
 ) -> Option<Split> {
     let mapping = Mapping::new(references.len(), &bounds.centroid);
-    bins_of_all::<R>(&mapping, references).best_split::<R>(&mapping, block_shift)
-}
-
-/// As [`find_split`], with the boxes of both sides.
-pub(crate) fn find_split_and_sides<R: Rounding>(
-    references: &[PrimitiveRef],
-    bounds: &RangeBounds,
-    block_shift: u32,
-) -> Option<(Split, [Bounds; 2])> {
-    let mapping = Mapping::new(references.len(), &bounds.centroid);
-    let bins = bins_of_all::<R>(&mapping, references);
-    let split = bins.best_split::<R>(&mapping, block_shift)?;
-    Some((split, bins.sides(&split, mapping.bins)))
-}
-
-fn bins_of_all<R: Rounding>(mapping: &Mapping, references: &[PrimitiveRef]) -> Bins {
     if tasks::in_pieces(references.len()) {
-        tasks::map_merge(
-            references,
-            &|piece| Bins::fill::<R>(mapping, piece),
-            &|a: Bins, b| a.merge(&b),
-        )
+        let fill = |piece: &[PrimitiveRef]| {
+            let mut bins = Bins::default();
+            bins.fill::<R>(&mapping, piece, isa);
+            bins
+        };
+        *bins = tasks::map_merge(references, &fill, &|a: Bins, b| a.merge(&b, mapping.bins));
     } else {
-        Bins::fill::<R>(mapping, references)
+        bins.fill::<R>(&mapping, references, isa);
     }
+    bins.best_split::<R>(&mapping, block_shift)
 }

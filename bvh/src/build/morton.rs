@@ -112,7 +112,7 @@ impl<R: Rounding> Builder<'_, R> {
                 a
             },
         );
-        let extent = (centroids.upper - centroids.lower).to_array();
+        let (lower, extent) = (centroids.lower(), centroids.extent().to_array());
         let scale = f32x4::new(extent.map(|e| {
             if e > SMALLEST_EXTENT {
                 R::reciprocal(e) * CELLS
@@ -123,7 +123,7 @@ impl<R: Rounding> Builder<'_, R> {
         tasks::for_each_piece(keys, &|keys: &mut [u64]| {
             for key in keys {
                 let centroid = self.reference(*key).doubled_centroid();
-                let cell = ((centroid - centroids.lower) * scale).fast_round_int();
+                let cell = ((centroid - lower) * scale).fast_round_int();
                 let [x, y, z, _] = cell.to_array().map(|c| spread_bits(c as u32));
                 *key = u64::from(x | y << 1 | z << 2) << CODE_SHIFT | u64::from(*key as u32);
             }
@@ -253,8 +253,9 @@ impl<R: Rounding> Builder<'_, R> {
         tasks::fill_from_jobs(
             &mut jobs[..spans.len()],
             own,
+            &mut (),
             &|range: &Range<'_>| range.keys.len(),
-            &|range| build(self, range, level + 1),
+            &|range, ()| build(self, range, level + 1),
         )?;
         Ok(Record::inner_around(range.records_begin, own))
     }

@@ -17,7 +17,7 @@ use super::{
     spatial::{self, Cutting, SpatialSplit},
     tasks,
 };
-use crate::{error::BuildError, params::BuildParams};
+use crate::{error::BuildError, params::BuildParams, simd::Isa};
 
 /// Levels kept free below a tree built by costs, in which oversized ranges are halved.
 pub(crate) const RESERVED_LEVELS: u32 = 8;
@@ -35,7 +35,6 @@ pub(crate) fn build<R: Rounding>(
     params: &BuildParams,
 ) -> Result<Record, BuildError> {
     let n = workspace.references.len();
-    workspace.scratch.resize(n, workspace.references[0]);
     run::<R, NoCorners>(workspace, params, n, None)
 }
 
@@ -55,7 +54,6 @@ where
     workspace
         .references
         .resize(capacity, workspace.references[0]);
-    workspace.scratch.clear();
     run::<R, C>(workspace, params, n, Some(corners))
 }
 
@@ -69,6 +67,7 @@ where
     C: Fn(LeafReference) -> [Vec3; 3] + Sync,
 {
     let capacity = workspace.references.len();
+    workspace.scratch.resize(capacity, workspace.references[0]);
     workspace.leaves.resize(capacity, LeafReference::default());
     workspace.records.resize(2 * capacity - 2, Record::UNUSED);
     let bounds = tasks::map_merge(
@@ -79,6 +78,7 @@ where
     let builder = Builder::<R, C> {
         params: params.canonical(),
         block_shift: params.sah_block_shift(),
+        isa: Isa::best(),
         cutting: corners
             .map(|corners| Cutting::new(corners, &bounds.geometry, R::EMPTY_SIDE_ENDS_BUDGET)),
         rounding: std::marker::PhantomData,
@@ -95,14 +95,14 @@ where
         records: &mut workspace.records,
         begin: 0,
     };
-    builder.subtree(root, slots, 1)
+    builder.subtree(root, slots, &mut Memory::default(), 1)
 }
 
 /// A range of references, with all that belongs to it alone.
 struct Range<'a> {
     /// The references, and behind them room for those that cuts make.
     references: &'a mut [PrimitiveRef],
-    /// As long as `references`, between which and it large partitions go back and forth; or empty.
+    /// As long as `references`, between which and it large partitions go back and forth.
     scratch: &'a mut [PrimitiveRef],
     leaves: &'a mut [LeafReference],
     /// How many references there are.
@@ -170,8 +170,7 @@ impl<'a> Range<'a> {
             right_begin += left_room;
         }
         let (references, references_right) = self.references.split_at_mut(right_begin);
-        let in_scratch = right_begin.min(self.scratch.len());
-        let (scratch, scratch_right) = self.scratch.split_at_mut(in_scratch);
+        let (scratch, scratch_right) = self.scratch.split_at_mut(right_begin);
         let (leaves, leaves_right) = self.leaves.split_at_mut(right_begin);
         let [left, right] = bounds;
         [
@@ -204,24 +203,39 @@ impl<'a> Range<'a> {
     }
 }
 
+/// What is reused from range to range.
+#[derive(Default)]
+struct Memory {
+    bins: binning::Bins,
+}
+
+/// Builds the subtree over a range at a level, the root being level 1.
+type BuildSubtree<B> = fn(&B, Range<'_>, Slots<'_>, &mut Memory, u32) -> Result<Record, BuildError>;
+
 struct Builder<R, C> {
     params: BuildParams,
     block_shift: u32,
+    isa: Isa,
     /// How primitives are cut, if they are.
     cutting: Option<Cutting<C>>,
     rounding: std::marker::PhantomData<R>,
 }
 
 impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
-    fn find_split(&self, range: &Range<'_>) -> Option<Split> {
+    fn find_split(&self, range: &Range<'_>, memory: &mut Memory) -> Option<Split> {
         let (references, bounds) = (range.references(), &range.bounds);
+        let object = binning::find_split::<R>(
+            references,
+            bounds,
+            self.block_shift,
+            self.isa,
+            &mut memory.bins,
+        );
         let Some(cutting) = self.cutting.as_ref().filter(|_| range.room() > 0) else {
-            return binning::find_split::<R>(references, bounds, self.block_shift)
-                .map(Split::Object);
+            return object.map(Split::Object);
         };
-        let object = binning::find_split_and_sides::<R>(references, bounds, self.block_shift);
         let (object_sah, overlap) = match &object {
-            Some((split, [left, right])) => (split.sah, left.intersection(right)),
+            Some(split) => (split.sah, split.sides[0].intersection(&split.sides[1])),
             None => (f32::INFINITY, Bounds::EMPTY),
         };
         let spatial = cutting.find_split::<R>(
@@ -232,22 +246,23 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
             &overlap,
             self.block_shift,
         );
-        spatial
-            .map(Split::Spatial)
-            .or_else(|| object.map(|(split, _)| Split::Object(split)))
+        spatial.map(Split::Spatial).or(object.map(Split::Object))
     }
 
     /// Divides the range by a plane, or halves it in sorted order if there is none.
     fn divide<'a>(&self, mut range: Range<'a>, split: Option<Split>) -> [Range<'a>; 2] {
         let partition = match (split, &self.cutting) {
             (Some(Split::Object(split)), _) => {
-                if tasks::in_pieces(range.len) && !range.scratch.is_empty() {
-                    let partition = partition::into_buffer(range.references, range.scratch, &split);
+                let references = &mut range.references[..range.len];
+                if self.cutting.is_some() && R::LIBRARY_ORDER {
+                    partition::in_place(references, |reference| split.is_left(reference))
+                } else if tasks::in_pieces(range.len) {
+                    let partition =
+                        partition::into_buffer(references, range.scratch, &split, self.isa);
                     std::mem::swap(&mut range.references, &mut range.scratch);
                     partition
                 } else {
-                    let references = &mut range.references[..range.len];
-                    partition::in_place(references, |reference| split.is_left(reference))
+                    partition::stable(references, range.scratch, &split, self.isa)
                 }
             }
             (Some(Split::Spatial(split)), Some(cutting)) => {
@@ -282,18 +297,19 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         &self,
         mut range: Range<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
         let at_limit = level + RESERVED_LEVELS >= self.params.max_depth;
         if n <= self.params.min_leaf_size as usize || at_limit {
             range.sort::<R>();
-            return self.leaf_phase(range, slots, level);
+            return self.leaf_phase(range, slots, memory, level);
         }
-        let split = self.find_split(&range);
+        let split = self.find_split(&range, memory);
         if n <= self.params.max_leaf_size as usize && self.leaf_is_cheap(&range, split.as_ref()) {
             range.sort::<R>();
-            return self.leaf_phase(range, slots, level);
+            return self.leaf_phase(range, slots, memory, level);
         }
         let bounds = range.bounds;
         let mut children = Children::new(self.divide(range, split));
@@ -306,13 +322,13 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
                 break;
             };
             let child = children.take(largest);
-            let split = self.find_split(&child);
+            let split = self.find_split(&child, memory);
             let [left, right] = self.divide(child, split);
             children.put(largest, left);
             children.push(right);
         }
         children.sort_by_descending_size();
-        self.node(&bounds, children, slots, level, Self::subtree)
+        self.node(&bounds, children, slots, memory, level, Self::subtree)
     }
 
     /// Leaves, and halving without regard to cost where too many references are left. The
@@ -321,6 +337,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         &self,
         range: Range<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
@@ -351,7 +368,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
             children.push(left);
             children.push(right);
         }
-        self.node(&bounds, children, slots, level, Self::leaf_phase)
+        self.node(&bounds, children, slots, memory, level, Self::leaf_phase)
     }
 
     /// Builds the children, at the same time where they are large, and records their node.
@@ -360,8 +377,9 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         bounds: &RangeBounds,
         children: Children<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
-        build: fn(&Self, Range<'_>, Slots<'_>, u32) -> Result<Record, BuildError>,
+        build: BuildSubtree<Self>,
     ) -> Result<Record, BuildError> {
         let (own, mut rest) = slots.records.split_at_mut(children.len());
         let mut rest_begin = slots.begin + own.len();
@@ -384,8 +402,9 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         tasks::fill_from_jobs(
             &mut jobs[..count],
             own,
+            memory,
             &|(range, _): &(Range<'_>, Slots<'_>)| range.len,
-            &|(range, slots)| build(self, range, slots, level + 1),
+            &|(range, slots), memory| build(self, range, slots, memory, level + 1),
         )?;
         Ok(Record::inner(&bounds.geometry, slots.begin, own))
     }

@@ -62,7 +62,7 @@ struct Mapping {
 
 impl Mapping {
     fn new(bounds: &Bounds) -> Self {
-        let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
+        let (lower, upper) = (bounds.lower().to_array(), bounds.upper().to_array());
         let scale: [f32; 4] = std::array::from_fn(|axis| {
             let epsilon = SMALLEST_EXTENT * lower[axis].abs().max(upper[axis].abs());
             let size = upper[axis] - lower[axis];
@@ -73,7 +73,7 @@ impl Mapping {
             }
         });
         Self {
-            offset: bounds.lower,
+            offset: bounds.lower(),
             scale: f32x4::new(scale),
             width: f32x4::new(scale.map(f32::recip)),
         }
@@ -212,8 +212,8 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                 }
                 continue;
             }
-            let first = mapping.bins_of::<R>(reference.0.lower);
-            let last = mapping.bins_of::<R>(reference.0.upper);
+            let first = mapping.bins_of::<R>(reference.0.lower());
+            let last = mapping.bins_of::<R>(reference.0.upper());
             let mut corners = None;
             for axis in 0..3 {
                 if scale[axis] == 0.0 {
@@ -256,14 +256,14 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
             if budget <= 1 {
                 continue;
             }
-            let first = split.mapping.bins_of::<R>(reference.0.lower)[split.axis];
-            let last = split.mapping.bins_of::<R>(reference.0.upper)[split.axis];
+            let first = split.mapping.bins_of::<R>(reference.0.lower())[split.axis];
+            let last = split.mapping.bins_of::<R>(reference.0.upper())[split.axis];
             if !(first < split.plane && split.plane <= last) {
                 continue;
             }
             let corners = self.corners_of(&reference);
             let [left, right] = clip(&corners, split.axis, position, &reference.0);
-            if is_empty(&left) || is_empty(&right) {
+            if left.is_empty() || right.is_empty() {
                 if self.empty_side_ends_budget {
                     references[index] = reference.with_budget(0);
                 }
@@ -305,22 +305,22 @@ fn chop(
     let (mut first, mut last) = span.into_inner();
     let (mut begin, mut end) = (first, last);
     // The bins were found by one rounding, the planes have another.
-    while first < last && mapping.position(axis, first + 1) <= bounds.lower.to_array()[axis] {
+    while first < last && mapping.position(axis, first + 1) <= bounds.lower().to_array()[axis] {
         first += 1;
     }
-    while first < last && mapping.position(axis, last) >= bounds.upper.to_array()[axis] {
+    while first < last && mapping.position(axis, last) >= bounds.upper().to_array()[axis] {
         last -= 1;
     }
     let mut rest = *bounds;
     for bin in first..last {
         let [left, right] = clip(corners, axis, mapping.position(axis, bin + 1), &rest);
-        if is_empty(&left) {
+        if left.is_empty() {
             begin += 1;
         }
         bins.bounds[axis][bin].extend(&left);
         rest = right;
     }
-    if is_empty(&rest) {
+    if rest.is_empty() {
         end -= 1;
     }
     bins.begins[axis][begin] += 1;
@@ -351,14 +351,9 @@ fn clip(corners: &[f32x4; 3], axis: usize, position: f32, bounds: &Bounds) -> [B
     [left.intersection(bounds), right.intersection(bounds)]
 }
 
-fn is_empty(bounds: &Bounds) -> bool {
-    let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
-    (0..3).any(|axis| lower[axis] > upper[axis])
-}
-
 /// Surface area; 0 of an empty box.
 fn area(bounds: &Bounds) -> f32 {
-    if is_empty(bounds) {
+    if bounds.is_empty() {
         0.0
     } else {
         2.0 * bounds.half_area()

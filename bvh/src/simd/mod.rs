@@ -11,6 +11,7 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
+pub(crate) mod build;
 pub(crate) mod dispatch;
 pub(crate) mod isa;
 pub(crate) mod portable;
