@@ -109,16 +109,17 @@ pub(crate) struct Split {
 }
 
 impl Split {
-    /// Whether a coordinate on the axis lies in a bin on the left side.
+    /// How far a reference lies behind the plane, in bins: negative on the left side.
     #[inline(always)]
-    pub(crate) fn is_below(&self, coordinate: f32) -> bool {
-        (coordinate - self.offset) * self.scale - self.shift < self.threshold
+    pub(crate) fn behind(&self, reference: &PrimitiveRef) -> f32 {
+        let coordinate = reference.doubled_centroid_on(self.axis);
+        (coordinate - self.offset) * self.scale - self.shift - self.threshold
     }
 
     /// Whether a reference lies on the left side.
     #[inline(always)]
     pub(crate) fn is_left(&self, reference: &PrimitiveRef) -> bool {
-        self.is_below(reference.doubled_centroid_on(self.axis))
+        self.behind(reference).is_sign_negative()
     }
 }
 

@@ -92,28 +92,32 @@ impl EightLanes for Stable<'_> {
         } = self;
         let scratch = &mut scratch[..references.len()];
         for index in 0..references.len() {
-            let is_left = split.is_left(&references[index]);
+            let behind = split.behind(&references[index]);
             let lanes = L::of(&references[index].0);
             // Both places are written; the counters say which of them counts. The left one has
             // been read already.
             references[left] = PrimitiveRef(lanes.to_bounds());
             scratch[right] = PrimitiveRef(lanes.to_bounds());
-            left += usize::from(is_left);
-            right += usize::from(!is_left);
-            extend_side(&mut centroids, lanes.doubled_centroid(), is_left);
+            let is_left = (behind.to_bits() >> 31) as usize;
+            left += is_left;
+            right += 1 - is_left;
+            extend_side(&mut centroids, lanes.doubled_centroid(), behind);
         }
         references[left..].copy_from_slice(&scratch[..right]);
         Partition::new(left, split, centroids.map(BoxLanes::to_bounds))
     }
 }
 
-/// Adds a box to one of two, without a branch: the other gets a box that changes nothing.
+/// Adds a box to the first of two where `behind` is negative, otherwise to the second; without a
+/// branch, since nobody can predict it: the other gets a box that changes nothing.
 #[inline(always)]
-fn extend_side<L: Halves>(sides: &mut [L; 2], bounds: L, is_left: bool) {
-    let (keep, drop) = (f32::NEG_INFINITY, f32::INFINITY);
-    let [left, right] = if is_left { [keep, drop] } else { [drop, keep] };
-    sides[0] = sides[0].min(bounds.max(L::splat(left)));
-    sides[1] = sides[1].min(bounds.max(L::splat(right)));
+fn extend_side<L: Halves>(sides: &mut [L; 2], bounds: L, behind: f32) {
+    // A minimum with −∞ in place keeps the box and with +∞ drops it; they differ in the sign.
+    let sign = behind.to_bits() & 1 << 31;
+    let infinity = f32::INFINITY.to_bits();
+    let (left, right) = (infinity | sign, infinity | sign ^ 1 << 31);
+    sides[0] = sides[0].min(bounds.max(L::splat(f32::from_bits(left))));
+    sides[1] = sides[1].min(bounds.max(L::splat(f32::from_bits(right))));
 }
 
 /// Divides from one buffer into another of the same length, in pieces.
@@ -196,9 +200,10 @@ impl EightLanes for CopyPiece<'_> {
         let mut centroids = [L::of(&Bounds::EMPTY); 2];
         let (mut left, mut right) = (self.to_left.iter_mut(), self.to_right.iter_mut());
         for reference in self.piece {
-            let is_left = self.split.is_left(reference);
+            let behind = self.split.behind(reference);
+            let is_left = behind.is_sign_negative();
             let centroid = L::of(&reference.0).doubled_centroid();
-            extend_side(&mut centroids, centroid, is_left);
+            extend_side(&mut centroids, centroid, behind);
             // The counts were taken with the same test, so that neither side runs out.
             if let Some(place) = if is_left { left.next() } else { right.next() } {
                 *place = *reference;
