@@ -176,9 +176,16 @@ impl Default for Bins {
     }
 }
 
+/// Bins for references at even places and at odd ones: where neighbours fall in the same bin, the
+/// processor need not wait for the first to be stored before it reads the bin for the second.
+pub(crate) type BinPair = [Bins; 2];
+
+/// From this size on ranges are binned in pairs; below, clearing and merging take longer.
+const PAIRS_FROM: usize = 64;
+
 /// Adds references to cleared bins.
 struct Fill<'a, R> {
-    bins: &'a mut Bins,
+    bins: &'a mut BinPair,
     mapping: &'a Mapping,
     references: &'a [PrimitiveRef],
     rounding: std::marker::PhantomData<R>,
@@ -190,14 +197,27 @@ impl<R: Rounding> EightLanes for Fill<'_, R> {
     #[inline(always)]
     fn run<L: Halves>(self) {
         let mapping = *self.mapping;
-        for reference in self.references {
+        let add = |bins: &mut Bins, reference: &PrimitiveRef| {
             let lanes = L::of(&reference.0);
-            let bins = mapping.bins_of::<R>(reference.doubled_centroid());
-            for (axis, bin) in bins.into_iter().enumerate() {
-                let bounds = &mut self.bins.bounds[bin][axis];
+            let indices = mapping.bins_of::<R>(reference.doubled_centroid());
+            for (axis, bin) in indices.into_iter().enumerate() {
+                let bounds = &mut bins.bounds[bin][axis];
                 *bounds = L::of(bounds).min(lanes).to_bounds();
-                self.bins.counts[bin][axis] += 1;
+                bins.counts[bin][axis] += 1;
             }
+        };
+        let [even, odd] = self.bins;
+        let mut rest = self.references;
+        if self.references.len() >= PAIRS_FROM {
+            let (pairs, last) = self.references.as_chunks::<2>();
+            for [a, b] in pairs {
+                add(even, a);
+                add(odd, b);
+            }
+            rest = last;
+        }
+        for reference in rest {
+            add(even, reference);
         }
     }
 }
@@ -208,25 +228,13 @@ impl Bins {
         self.counts[..bins].fill([0; 4]);
     }
 
-    fn fill<R: Rounding>(&mut self, mapping: &Mapping, references: &[PrimitiveRef], isa: Isa) {
-        self.clear(mapping.bins);
-        let kernel = Fill::<R> {
-            bins: self,
-            mapping,
-            references,
-            rounding: std::marker::PhantomData,
-        };
-        simd::build::run(isa, kernel);
-    }
-
-    fn merge(mut self, other: &Self, bins: usize) -> Self {
+    fn merge(&mut self, other: &Self, bins: usize) {
         for bin in 0..bins {
             for axis in 0..3 {
                 self.bounds[bin][axis].extend(&other.bounds[bin][axis]);
                 self.counts[bin][axis] += other.counts[bin][axis];
             }
         }
-        self
     }
 
     /// The cheapest plane of an axis: the cost and the first bin on its right. Ties keep the
@@ -279,24 +287,48 @@ impl Bins {
     }
 }
 
+/// Bins references; the first of the pair has the result.
+fn fill<R: Rounding>(bins: &mut BinPair, mapping: &Mapping, references: &[PrimitiveRef], isa: Isa) {
+    let in_pairs = references.len() >= PAIRS_FROM;
+    bins[0].clear(mapping.bins);
+    if in_pairs {
+        bins[1].clear(mapping.bins);
+    }
+    let kernel = Fill::<R> {
+        bins,
+        mapping,
+        references,
+        rounding: std::marker::PhantomData,
+    };
+    simd::build::run(isa, kernel);
+    if in_pairs {
+        let [even, odd] = bins;
+        even.merge(odd, mapping.bins);
+    }
+}
+
 /// The cheapest plane of all axes; `None` if all centroids coincide or no plane parts them.
 pub(crate) fn find_split<R: Rounding>(
     references: &[PrimitiveRef],
     bounds: &RangeBounds,
     block_shift: u32,
     isa: Isa,
-    bins: &mut Bins,
+    bins: &mut BinPair,
 ) -> Option<Split> {
     let mapping = Mapping::new(references.len(), &bounds.centroid);
     if tasks::in_pieces(references.len()) {
-        let fill = |piece: &[PrimitiveRef]| {
-            let mut bins = Bins::default();
-            bins.fill::<R>(&mapping, piece, isa);
+        let of_piece = |piece: &[PrimitiveRef]| {
+            let mut bins = BinPair::default();
+            fill::<R>(&mut bins, &mapping, piece, isa);
             bins
         };
-        *bins = tasks::map_merge(references, &fill, &|a: Bins, b| a.merge(&b, mapping.bins));
+        let merge = |mut a: BinPair, b: BinPair| {
+            a[0].merge(&b[0], mapping.bins);
+            a
+        };
+        *bins = tasks::map_merge(references, &of_piece, &merge);
     } else {
-        bins.fill::<R>(&mapping, references, isa);
+        fill::<R>(bins, &mapping, references, isa);
     }
-    bins.best_split::<R>(&mapping, block_shift)
+    bins[0].best_split::<R>(&mapping, block_shift)
 }

@@ -206,7 +206,7 @@ impl<'a> Range<'a> {
 /// What is reused from range to range.
 #[derive(Default)]
 struct Memory {
-    bins: binning::Bins,
+    bins: binning::BinPair,
 }
 
 /// Builds the subtree over a range at a level, the root being level 1.
