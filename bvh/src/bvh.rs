@@ -3,14 +3,15 @@
 use glam::Vec3;
 
 use crate::{
+    any_tree::AnyTree,
     bounds::Aabb,
-    build::{BuildWorkspace, LeafReference, primitive::PrimitiveRef, recursion},
+    build::{BuildWorkspace, primitive::PrimitiveRef, recursion},
     error::BuildError,
-    layout::{emit, tree::Tree},
+    layout::{emit::Source, triangles::Triangles},
     mesh::{MeshError, TriangleMesh},
     params::BuildParams,
     ray::{Hit, Ray, Work},
-    simd::{Isa, dispatch},
+    simd::Isa,
     stats::TreeStats,
     traverse::kernel::{Candidate, Count, RaySetup, power_of_two_below},
 };
@@ -21,9 +22,9 @@ const COORDINATE_MAX: f32 = (1u128 << 100) as f32;
 
 /// A bounding volume hierarchy over triangles.
 ///
-/// Which triangle a ray hits, and where, is a function of the ray and the meshes alone: no
-/// parameter of the build, no instruction set and no number of threads changes a bit of it. Equal
-/// distances are decided by the lowest geometry id, then by the lowest primitive id.
+/// Which triangle a ray hits, and where, is a function of the ray, the meshes and
+/// [`Accuracy`](crate::Accuracy) alone: no other parameter of the build, no instruction set and no
+/// number of threads changes a bit of it. Equal distances are decided by the lowest geometry id, then by the lowest primitive id.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     tree: AnyTree,
@@ -35,13 +36,6 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
-}
-
-#[derive(Clone, Debug)]
-enum AnyTree {
-    Two(Tree<2, 2>),
-    Four(Tree<4, 2>),
-    Eight(Tree<8, 8>),
 }
 
 impl Bvh {
@@ -79,22 +73,18 @@ impl Bvh {
                 }));
         }
         let root = recursion::build(workspace, params)?;
-        let source = emit::Source {
+        let source = Source {
+            root,
             records: &workspace.records,
             leaves: &workspace.leaves,
-            triangle: |leaf: LeafReference| {
-                let geometry_id = leaf.geometry_id as usize;
-                let corners = meshes[geometry_id].corners(leaf.primitive_id);
-                let id = first_ids[geometry_id] + leaf.primitive_id;
-                (id, corners.map(|v| v * scale))
+            triangles: Triangles {
+                meshes,
+                first_ids: &first_ids,
+                first_points: &first_points(meshes)?,
+                scale,
             },
         };
-        let mut tree = AnyTree::new(params.branching_factor);
-        match &mut tree {
-            AnyTree::Two(tree) => emit::emit(tree, root.as_ref(), &source),
-            AnyTree::Four(tree) => emit::emit(tree, root.as_ref(), &source),
-            AnyTree::Eight(tree) => emit::emit(tree, root.as_ref(), &source),
-        }
+        let tree = AnyTree::new(&source, params)?;
         if params.dynamics == crate::Dynamics::Static {
             *workspace = BuildWorkspace::default();
         }
@@ -163,21 +153,13 @@ impl Bvh {
     /// Counts, depth, cost and bytes, found by walking through the tree.
     #[must_use]
     pub fn stats(&self) -> TreeStats {
-        match &self.tree {
-            AnyTree::Two(tree) => TreeStats::of(tree, &self.params),
-            AnyTree::Four(tree) => TreeStats::of(tree, &self.params),
-            AnyTree::Eight(tree) => TreeStats::of(tree, &self.params),
-        }
+        self.tree.stats(&self.params)
     }
 
     #[inline]
     fn closest_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> Option<Hit> {
         let setup = RaySetup::new(ray, self.scale)?;
-        let candidate = match &self.tree {
-            AnyTree::Two(tree) => dispatch::closest(self.isa, tree, &setup, count),
-            AnyTree::Four(tree) => dispatch::closest(self.isa, tree, &setup, count),
-            AnyTree::Eight(tree) => dispatch::closest(self.isa, tree, &setup, count),
-        }?;
+        let candidate = self.tree.closest(self.isa, &setup, count)?;
         Some(hit_of(&candidate, &setup, &self.first_ids))
     }
 
@@ -186,22 +168,7 @@ impl Bvh {
         let Some(setup) = RaySetup::new(ray, self.scale) else {
             return false;
         };
-        match &self.tree {
-            AnyTree::Two(tree) => dispatch::any(self.isa, tree, &setup, count),
-            AnyTree::Four(tree) => dispatch::any(self.isa, tree, &setup, count),
-            AnyTree::Eight(tree) => dispatch::any(self.isa, tree, &setup, count),
-        }
-    }
-}
-
-impl AnyTree {
-    /// An empty tree of a branching factor that has been validated.
-    fn new(branching_factor: u32) -> Self {
-        match branching_factor {
-            ..=2 => Self::Two(Tree::default()),
-            3..=4 => Self::Four(Tree::default()),
-            _ => Self::Eight(Tree::default()),
-        }
+        self.tree.any(self.isa, &setup, count)
     }
 }
 
@@ -210,7 +177,8 @@ impl AnyTree {
 pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32]) -> Hit {
     let (geometry_id, primitive_id) = locate(first_ids, candidate.id);
     Hit {
-        t: setup.unscaled(candidate.t),
+        // A ray that starts on a triangle meets it at 0 of either sign.
+        t: setup.unscaled(candidate.t) + 0.0,
         u: candidate.u,
         v: candidate.v,
         geometry_id,
@@ -235,6 +203,27 @@ pub(crate) fn first_ids(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, MeshError>
     }
     first_ids.push(next);
     Ok(first_ids)
+}
+
+/// Number of each mesh's first vertex over all meshes, and the total at the end.
+fn first_points(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, BuildError> {
+    const LIMIT: usize = u32::MAX as usize;
+    let count = meshes.iter().map(|mesh| mesh.vertices().len()).sum();
+    if count > LIMIT {
+        return Err(BuildError::TreeTooLarge {
+            parts: "vertices",
+            count,
+            limit: LIMIT,
+        });
+    }
+    let mut next = 0;
+    let mut first_points = Vec::with_capacity(meshes.len() + 1);
+    for mesh in meshes {
+        first_points.push(next);
+        next += mesh.vertices().len() as u32;
+    }
+    first_points.push(next);
+    Ok(first_points)
 }
 
 /// Geometry id and primitive id of a triangle, by its number over all meshes.

@@ -9,14 +9,19 @@ use std::arch::x86_64::{
     __m128, __m256, __m256i, _CMP_LE_OQ, _CMP_NEQ_OQ, _mm_add_ps, _mm_and_ps, _mm_andnot_ps,
     _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_max_ps, _mm_min_ps, _mm_movemask_ps,
     _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps, _mm_sub_ps, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
-    _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps,
-    _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps,
-    _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
+    _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps,
+    _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256,
+    _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
     _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
-    _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_xor_ps,
+    _mm256_slli_epi32, _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256,
+    _mm256_sub_ps, _mm256_xor_ps,
 };
 
-use super::{Lanes, stack::Stack};
+use super::{
+    Lanes,
+    portable::{Half, Halves},
+    stack::Stack,
+};
 
 /// Four lanes in an SSE register.
 #[derive(Clone, Copy, Debug)]
@@ -176,35 +181,118 @@ lanes_by_intrinsics!(
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u32, stack: &mut Stack) {
-        // SAFETY: AVX2 is available (file header). The loads read the eight words of `children`
-        // and of one row of the table, whose index is below 256 because only eight bits of a
-        // mask of eight lanes can be set.
-        let (references, distances) = unsafe {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+        // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
+        let (slots, children) = unsafe {
             let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            let slots = _mm256_and_si256(
-                _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), fields),
-                _mm256_set1_epi32(7),
-            );
-            // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
-            let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
-            let signs =
-                std::arch::x86_64::_mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
-            let sorted = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_permutevar8x32_epi32(
-                signs, slots,
-            )));
-            let close =
-                _mm256_loadu_si256(COMPRESS[sorted as usize & 255].as_ptr().cast::<__m256i>());
-            let slots = _mm256_permutevar8x32_epi32(slots, close);
-            let children = _mm256_loadu_si256(children.as_ptr().cast::<__m256i>());
+            let order = _mm256_set1_epi32(order as u32 as i32);
             (
-                _mm256_permutevar8x32_epi32(children, slots),
-                _mm256_castps_si256(_mm256_permutevar8x32_ps(self.0, slots)),
+                _mm256_and_si256(_mm256_srlv_epi32(order, fields), _mm256_set1_epi32(7)),
+                _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()),
             )
         };
-        stack.push_eight(references, distances, mask.count_ones());
+        let sorted = sorted_mask(mask, slots);
+        // SAFETY: as above.
+        let (references, distances) = unsafe {
+            let slots = _mm256_permutevar8x32_epi32(slots, closing(sorted));
+            (
+                _mm256_permutevar8x32_epi32(children, slots),
+                _mm256_permutevar8x32_ps(self.0, slots),
+            )
+        };
+        push_eight(stack, references, distances, mask.count_ones());
     }
 );
+
+impl Half for F32x8 {
+    #[inline(always)]
+    fn push_children_of_both(
+        both: Halves<Self>,
+        mask: u32,
+        children: &[u32; 16],
+        order: u64,
+        stack: &mut Stack<16>,
+    ) {
+        for half in 0..2 {
+            // SAFETY: AVX2 is available (file header). The loads read eight words each of the
+            // sixteen of `children`.
+            let (sorted, references, distances) = unsafe {
+                let fields = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+                let order = _mm256_set1_epi32((order >> (32 * half)) as u32 as i32);
+                let slots = _mm256_srlv_epi32(order, fields);
+                // Bit 3 of a slot, moved to the sign, tells which half it is in.
+                let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(slots));
+                let low = sorted_mask(mask & 255, slots);
+                let high = sorted_mask(mask >> 8, slots);
+                let is_high = _mm256_movemask_ps(upper) as u32;
+                let sorted = low & !is_high | high & is_high;
+                let close = closing(sorted);
+                let slots = _mm256_permutevar8x32_epi32(slots, close);
+                let upper = _mm256_permutevar8x32_ps(upper, close);
+                let words = children.as_ptr().cast::<__m256i>();
+                let reference = |k: usize| {
+                    let words = _mm256_loadu_si256(words.add(k));
+                    _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(words, slots))
+                };
+                let distance = |d: __m256| _mm256_permutevar8x32_ps(d, slots);
+                (
+                    sorted,
+                    _mm256_blendv_ps(reference(0), reference(1), upper),
+                    _mm256_blendv_ps(distance(both.0.0), distance(both.1.0), upper),
+                )
+            };
+            // SAFETY: as above.
+            let references = unsafe { _mm256_castps_si256(references) };
+            push_eight(stack, references, distances, sorted.count_ones());
+        }
+    }
+}
+
+/// The bits of a mask of eight lanes in the order of `slots`, of which the lowest three bits count.
+#[inline(always)]
+fn sorted_mask(mask: u32, slots: __m256i) -> u32 {
+    // SAFETY: AVX2 is available wherever a vector of this module exists (file header).
+    unsafe {
+        // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
+        let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
+        let signs = _mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
+        let sorted = _mm256_permutevar8x32_epi32(signs, slots);
+        _mm256_movemask_ps(_mm256_castsi256_ps(sorted)) as u32
+    }
+}
+
+/// The permutation that closes the gaps of a mask of eight lanes.
+#[inline(always)]
+fn closing(mask: u32) -> __m256i {
+    let row = &COMPRESS[mask as usize & 255];
+    // SAFETY: AVX2 is available (file header); the load reads the eight words of the row.
+    unsafe { _mm256_loadu_si256(row.as_ptr().cast::<__m256i>()) }
+}
+
+/// Pushes the first `count ≤ 8` of eight entries.
+#[inline(always)]
+pub(super) fn push_eight<const N: usize>(
+    stack: &mut Stack<N>,
+    references: __m256i,
+    distances: __m256,
+    count: u32,
+) {
+    const {
+        assert!(
+            N >= 8,
+            "a push may write as many entries as a node has children"
+        )
+    };
+    let (reference, distance) = stack.top(8);
+    // SAFETY: AVX2 is available (file header). By the invariant of the stack (checked in builds
+    // with debug assertions) N ≥ 8 entries from the top on lie inside each array; unaligned stores
+    // ask for no alignment. They initialise eight entries, of which at most eight are counted in.
+    unsafe {
+        _mm256_storeu_si256(reference.cast::<__m256i>(), references);
+        _mm256_storeu_ps(distance, distances);
+        stack.grow(count);
+    }
+}
 
 /// Row m lists the set bits of m from the lowest to the highest, then zeros: the permutation that
 /// closes the gaps of a mask.

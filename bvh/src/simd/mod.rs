@@ -58,7 +58,13 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     /// `self`, in the order of the child numbers that `order` holds in fields of
     /// `log2(N)` bits, lowest field first.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; N], order: u32, stack: &mut stack::Stack) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; N],
+        order: u64,
+        stack: &mut stack::Stack<N>,
+    ) {
         let distances = self.store();
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
