@@ -142,6 +142,11 @@ fn corners_of(leaves: &[LeafReference], triangles: &Triangles<'_>) -> [[Vec3; 3]
     })
 }
 
+#[inline(always)]
+fn load<L: Lanes<4>>([x, y, z]: &Rows) -> [L; 3] {
+    [L::load(x), L::load(y), L::load(z)]
+}
+
 /// One vector per lane, component by component.
 fn rows(lanes: [Vec3; BLOCK_SIZE]) -> Rows {
     std::array::from_fn(|axis| lanes.map(|v| v[axis]))
@@ -169,7 +174,7 @@ impl Block for EdgeBlock {
 impl WithEdges for EdgeBlock {
     #[inline(always)]
     fn edges<L: Lanes<4>>(&self, _points: &[Point]) -> [[L; 3]; 3] {
-        [&self.vertex, &self.edge_1, &self.edge_2].map(|rows| rows.each_ref().map(L::load))
+        [load(&self.vertex), load(&self.edge_1), load(&self.edge_2)]
     }
 }
 
@@ -192,9 +197,13 @@ impl Block for CornerBlock {
 
 impl WithCorners for CornerBlock {
     #[inline(always)]
-    fn corners<L: Lanes<4>>(&self, _points: &[Point], axes: [usize; 3]) -> [[L; 3]; 3] {
-        let load = |rows: &Rows| axes.map(|axis| L::load(&rows[axis]));
-        self.corners.each_ref().map(load)
+    fn corners<L: Lanes<4>>(&self, _points: &[Point], [x, y, z]: [usize; 3]) -> [[L; 3]; 3] {
+        let [a, b, c] = &self.corners;
+        [
+            [L::load(&a[x]), L::load(&a[y]), L::load(&a[z])],
+            [L::load(&b[x]), L::load(&b[y]), L::load(&b[z])],
+            [L::load(&c[x]), L::load(&c[y]), L::load(&c[z])],
+        ]
     }
 }
 
@@ -223,10 +232,11 @@ impl Block for IndexBlock {
 impl WithCorners for IndexBlock {
     #[inline(always)]
     fn corners<L: Lanes<4>>(&self, points: &[Point], axes: [usize; 3]) -> [[L; 3]; 3] {
-        self.points.map(|numbers| {
-            let lanes = numbers.map(|number| &points[number as usize]);
-            axes.map(|axis| L::load(&lanes.map(|point| point[axis])))
-        })
+        [
+            gather(points, self.points[0], axes),
+            gather(points, self.points[1], axes),
+            gather(points, self.points[2], axes),
+        ]
     }
 }
 
@@ -234,9 +244,28 @@ impl WithEdges for IndexBlock {
     #[inline(always)]
     fn edges<L: Lanes<4>>(&self, points: &[Point]) -> [[L; 3]; 3] {
         let [a, b, c] = self.corners::<L>(points, [0, 1, 2]);
-        let difference = |p: [L; 3], q: [L; 3]| std::array::from_fn(|axis| p[axis].sub(q[axis]));
         [a, difference(a, b), difference(c, a)]
     }
+}
+
+/// Four points, by three axes in any order.
+#[inline(always)]
+fn gather<L: Lanes<4>>(
+    points: &[Point],
+    numbers: [u32; BLOCK_SIZE],
+    [x, y, z]: [usize; 3],
+) -> [L; 3] {
+    let lanes = numbers.map(|number| &points[number as usize]);
+    [
+        L::load(&lanes.map(|point| point[x])),
+        L::load(&lanes.map(|point| point[y])),
+        L::load(&lanes.map(|point| point[z])),
+    ]
+}
+
+#[inline(always)]
+fn difference<L: Lanes<4>>(p: [L; 3], q: [L; 3]) -> [L; 3] {
+    [p[0].sub(q[0]), p[1].sub(q[1]), p[2].sub(q[2])]
 }
 
 #[cfg(test)]

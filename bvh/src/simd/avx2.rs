@@ -230,19 +230,24 @@ impl Half for F32x8 {
                 let slots = _mm256_permutevar8x32_epi32(slots, close);
                 let upper = _mm256_permutevar8x32_ps(upper, close);
                 let words = children.as_ptr().cast::<__m256i>();
-                let reference = |k: usize| {
-                    let words = _mm256_loadu_si256(words.add(k));
-                    _mm256_castsi256_ps(_mm256_permutevar8x32_epi32(words, slots))
-                };
-                let distance = |d: __m256| _mm256_permutevar8x32_ps(d, slots);
+                let references = [
+                    _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words), slots),
+                    _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words.add(1)), slots),
+                ];
+                let distances = [
+                    _mm256_permutevar8x32_ps(both.0.0, slots),
+                    _mm256_permutevar8x32_ps(both.1.0, slots),
+                ];
                 (
                     sorted,
-                    _mm256_blendv_ps(reference(0), reference(1), upper),
-                    _mm256_blendv_ps(distance(both.0.0), distance(both.1.0), upper),
+                    _mm256_castps_si256(_mm256_blendv_ps(
+                        _mm256_castsi256_ps(references[0]),
+                        _mm256_castsi256_ps(references[1]),
+                        upper,
+                    )),
+                    _mm256_blendv_ps(distances[0], distances[1], upper),
                 )
             };
-            // SAFETY: as above.
-            let references = unsafe { _mm256_castps_si256(references) };
             push_eight(stack, references, distances, sorted.count_ones());
         }
     }

@@ -73,3 +73,9 @@ pub(crate) trait Lanes<const N: usize>: Copy {
         }
     }
 }
+
+/// Each of three values in every lane.
+#[inline(always)]
+pub(crate) fn splat_all<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
+    [L::splat(x), L::splat(y), L::splat(z)]
+}

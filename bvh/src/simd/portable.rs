@@ -192,8 +192,8 @@ impl<L: Half> Lanes<16> for Halves<L> {
     }
     #[inline(always)]
     fn load(array: &[f32; 16]) -> Self {
-        let half = |k: usize| std::array::from_fn(|i| array[8 * k + i]);
-        Self(L::load(&half(0)), L::load(&half(1)))
+        let (halves, _) = array.as_chunks();
+        Self(L::load(&halves[0]), L::load(&halves[1]))
     }
     #[inline(always)]
     fn store(self) -> [f32; 16] {

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     layout::triangles::{Point, WithEdges},
-    simd::Lanes,
+    simd::{Lanes, splat_all},
 };
 
 /// Names the test.
@@ -40,8 +40,8 @@ impl<B: WithEdges> TriangleTest<B> for Fast {
     #[inline(always)]
     fn prepare<L: Lanes<4>>(ray: &RaySetup) -> FastRay<L> {
         FastRay {
-            origin: ray.origin.map(L::splat),
-            direction: ray.direction.map(L::splat),
+            origin: splat_all(ray.origin),
+            direction: splat_all(ray.direction),
             pad: ray.margin.map(|margin| margin * TRIANGLE_PAD),
         }
     }
@@ -94,8 +94,17 @@ fn sub<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 
 #[inline(always)]
 fn cross<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
-    let component = |i: usize, j: usize| a[i].mul(b[j]).sub(a[j].mul(b[i]));
-    [component(1, 2), component(2, 0), component(0, 1)]
+    [
+        determinant(a[1], a[2], b[1], b[2]),
+        determinant(a[2], a[0], b[2], b[0]),
+        determinant(a[0], a[1], b[0], b[1]),
+    ]
+}
+
+/// a·d − b·c.
+#[inline(always)]
+fn determinant<L: Lanes<4>>(a: L, b: L, c: L, d: L) -> L {
+    a.mul(d).sub(b.mul(c))
 }
 
 #[inline(always)]

@@ -26,7 +26,7 @@ use super::{
 };
 use crate::{
     layout::triangles::{Point, WithCorners},
-    simd::Lanes,
+    simd::{Lanes, splat_all},
 };
 
 /// Edge values below this are found again in f64: quotients of larger ones do not underflow.
@@ -83,8 +83,8 @@ impl<B: WithCorners> TriangleTest<B> for Robust {
         let margin = margin_of(ray, axes[2]);
         RobustRay {
             axes,
-            origin: axes.map(|axis| L::splat(ray.origin[axis])),
-            shear: [x / z, y / z].map(L::splat),
+            origin: splat_all(axes.map(|axis| ray.origin[axis])),
+            shear: [L::splat(x / z), L::splat(y / z)],
             direction_z: z,
             reciprocal: axes.map(|axis| ray.reciprocal[axis]),
             pad: axes.map(|axis| margin[axis] * TRIANGLE_PAD),
@@ -100,8 +100,9 @@ impl<B: WithCorners> TriangleTest<B> for Robust {
         t_max: f32,
     ) -> BlockHits<L> {
         let corners = block.corners::<L>(points, prepared.axes);
-        let [a, b, c] = corners.map(|corner| prepared.sheared(corner));
-        let edge = |p: [L; 3], q: [L; 3]| p[0].mul(q[1]).sub(p[1].mul(q[0]));
+        let a = prepared.sheared(corners[0]);
+        let b = prepared.sheared(corners[1]);
+        let c = prepared.sheared(corners[2]);
         let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
         let zero = L::splat(0.0);
         let (low, high) = (u.min(v).min(w), u.max(v).max(w));
@@ -139,10 +140,16 @@ impl<L: Lanes<4>> RobustRay<L> {
     /// A vertex in the space in which the ray is the axis z.
     #[inline(always)]
     fn sheared(&self, corner: [L; 3]) -> [L; 3] {
-        let to = |axis: usize| corner[axis].sub(self.origin[axis]);
-        let (x, y, z) = (to(0), to(1), to(2));
+        let z = corner[2].sub(self.origin[2]);
+        let (x, y) = (corner[0].sub(self.origin[0]), corner[1].sub(self.origin[1]));
         [x.sub(self.shear[0].mul(z)), y.sub(self.shear[1].mul(z)), z]
     }
+}
+
+/// On which side of the edge from q to p the axis z is.
+#[inline(always)]
+fn edge<L: Lanes<4>>(p: [L; 3], q: [L; 3]) -> L {
+    p[0].mul(q[1]).sub(p[1].mul(q[0]))
 }
 
 /// Does the `doubtful` lanes again by [`in_f64`].
@@ -154,8 +161,13 @@ fn decide<L: Lanes<4>>(
     mut doubtful: u32,
     hits: &mut BlockHits<L>,
 ) {
-    let corners = corners.map(|corner| corner.map(L::store));
-    let mut columns = [hits.t, hits.u, hits.v, hits.den].map(L::store);
+    let corners = [store(corners[0]), store(corners[1]), store(corners[2])];
+    let mut columns = [
+        hits.t.store(),
+        hits.u.store(),
+        hits.v.store(),
+        hits.den.store(),
+    ];
     while doubtful != 0 {
         let lane = doubtful.trailing_zeros() as usize & 3;
         doubtful &= doubtful - 1;
@@ -168,7 +180,15 @@ fn decide<L: Lanes<4>>(
             None => hits.mask &= !(1 << lane),
         }
     }
-    [hits.t, hits.u, hits.v, hits.den] = columns.each_ref().map(L::load);
+    hits.t = L::load(&columns[0]);
+    hits.u = L::load(&columns[1]);
+    hits.v = L::load(&columns[2]);
+    hits.den = L::load(&columns[3]);
+}
+
+#[inline(always)]
+fn store<L: Lanes<4>>([x, y, z]: [L; 3]) -> [[f32; 4]; 3] {
+    [x.store(), y.store(), z.store()]
 }
 
 /// Distance and weights of vertices 1 and 2, from sheared vertices, with edge values of exact sign.

@@ -88,11 +88,10 @@ pub(crate) fn box_interval<L: Lanes<4>>(
     for axis in 0..3 {
         let pad = L::splat(pad[axis]);
         let reciprocal = L::splat(reciprocal[axis]);
-        let at = |plane: L| plane.sub(origin[axis]).mul(reciprocal);
-        let (low, high) = (
-            at(a[axis].min(b[axis]).min(c[axis])),
-            at(a[axis].max(b[axis]).max(c[axis])),
-        );
+        let low = a[axis].min(b[axis]).min(c[axis]);
+        let high = a[axis].max(b[axis]).max(c[axis]);
+        let low = low.sub(origin[axis]).mul(reciprocal);
+        let high = high.sub(origin[axis]).mul(reciprocal);
         // The sign of the direction swaps the planes; min and max of the two do the same.
         enter = enter.max(low.min(high).sub(pad));
         leave = leave.min(low.max(high).add(pad));
