@@ -25,11 +25,11 @@ use super::{
 
 /// Four lanes in an SSE register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct F32x4(__m128);
+pub(crate) struct F32x4(pub(super) __m128);
 
 /// Eight lanes in an AVX register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct F32x8(__m256);
+pub(crate) struct F32x8(pub(super) __m256);
 
 /// The result of a comparison of four lanes.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +39,18 @@ pub(crate) struct Mask4(__m128);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mask8(__m256);
 
+/// Also for `avx512`, with the argument of its header in place of this one's.
 macro_rules! lanes_by_intrinsics {
     ($lanes:ident, $mask:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $fmadd:ident, $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
-     $cmp:ident, $movemask:ident $(, $push:item)?) => {
+     $cmp:ident, $and_mask:ident, $movemask:ident $(, $push:item)?) => {
         impl std::ops::BitAnd for $mask {
             type Output = Self;
             #[inline(always)]
             fn bitand(self, other: Self) -> Self {
-                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
-                Self(unsafe { $and(self.0, other.0) })
+                // SAFETY: the instructions are available wherever a value of this type exists
+                // (file header).
+                Self(unsafe { $and_mask(self.0, other.0) })
             }
         }
 
@@ -57,7 +59,7 @@ macro_rules! lanes_by_intrinsics {
 
             #[inline(always)]
             fn splat(value: f32) -> Self {
-                // SAFETY: only kernels entered after AVX2 was detected call this (file header).
+                // SAFETY: only kernels entered after detection call this (file header).
                 Self(unsafe { $set1(value) })
             }
             #[inline(always)]
@@ -69,14 +71,14 @@ macro_rules! lanes_by_intrinsics {
             #[inline(always)]
             fn store(self) -> [f32; $n] {
                 let mut array = [0.0; $n];
-                // SAFETY: AVX2 is available (file header); the array holds exactly the lanes that
-                // are written, and the unaligned store asks for no alignment.
+                // SAFETY: as `splat`; the array holds exactly the lanes that are written, and the unaligned store asks for no alignment.
                 unsafe { $store(array.as_mut_ptr(), self.0) };
                 array
             }
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
+                // SAFETY: the instructions are available wherever a value of this type exists
+                // (file header).
                 Self(unsafe { $add(self.0, other.0) })
             }
             #[inline(always)]
@@ -139,6 +141,8 @@ macro_rules! lanes_by_intrinsics {
     };
 }
 
+pub(super) use lanes_by_intrinsics;
+
 lanes_by_intrinsics!(
     F32x4,
     Mask4,
@@ -157,6 +161,7 @@ lanes_by_intrinsics!(
     _mm_andnot_ps,
     _mm_xor_ps,
     _mm_cmp_ps,
+    _mm_and_ps,
     _mm_movemask_ps
 );
 
@@ -178,6 +183,7 @@ lanes_by_intrinsics!(
     _mm256_andnot_ps,
     _mm256_xor_ps,
     _mm256_cmp_ps,
+    _mm256_and_ps,
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]

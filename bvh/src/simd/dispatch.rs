@@ -4,12 +4,12 @@
 
 use wide::{f32x4, f32x8};
 
-#[cfg(target_arch = "x86_64")]
-use super::avx2;
 use super::{
     Isa, Lanes,
     portable::{Halves, Pair},
 };
+#[cfg(target_arch = "x86_64")]
+use super::{avx2, avx512};
 use crate::{
     layout::{tree::Tree, triangles::Block},
     traverse::{
@@ -25,6 +25,9 @@ pub(crate) trait Width<const N: usize> {
     /// AVX2 lanes.
     #[cfg(target_arch = "x86_64")]
     type Avx2: Lanes<N>;
+    /// AVX-512 lanes.
+    #[cfg(target_arch = "x86_64")]
+    type Avx512: Lanes<N>;
 }
 
 /// Names the widths that have kernels.
@@ -35,24 +38,32 @@ impl Width<2> for Widths {
     type Portable = Pair<f32x4>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = Pair<avx2::F32x4>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = Pair<avx2::F32x4>;
 }
 
 impl Width<4> for Widths {
     type Portable = f32x4;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = avx2::F32x4;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x4;
 }
 
 impl Width<8> for Widths {
     type Portable = f32x8;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = avx2::F32x8;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x8;
 }
 
 impl Width<16> for Widths {
     type Portable = Halves<f32x8>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = Halves<avx2::F32x8>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x16;
 }
 
 /// The closest hit of a ray with a tree.
@@ -70,6 +81,9 @@ where
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
         Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, C>(tree, ray, count) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, for `Isa::Avx512`.
+        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, C>(tree, ray, count) },
         _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(
             tree, ray, count,
         ),
@@ -91,6 +105,9 @@ where
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
         Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, C>(tree, ray, count) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, C>(tree, ray, count) },
         _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
     }
 }
@@ -135,4 +152,12 @@ entries!(
     any_avx2,
     Avx2,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
+);
+
+#[cfg(target_arch = "x86_64")]
+entries!(
+    closest_avx512,
+    any_avx512,
+    Avx512,
+    "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"
 );

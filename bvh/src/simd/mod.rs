@@ -1,9 +1,9 @@
 //! The SIMD room: the only place of this crate with `unsafe`.
 //!
 //! Four layers after BurntSushi/memchr: [`Lanes`] is the handful of operations that traversal
-//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`] and
-//! [`avx2`] are the two implementations; [`dispatch`] enters one kernel per instruction set, chosen
-//! once by [`Isa`].
+//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`], [`avx2`]
+//! and [`avx512`] are the implementations; [`dispatch`] enters one kernel per instruction set,
+//! chosen once by [`Isa`].
 //!
 //! Invariant: the operations of [`Lanes`] other than [`Lanes::mul_add`] round once each in the
 //! same way in every implementation, so that a triangle test gives the same bits everywhere.
@@ -11,6 +11,8 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
 pub(crate) mod dispatch;
 pub(crate) mod isa;
 pub(crate) mod portable;
