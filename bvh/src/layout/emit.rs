@@ -4,7 +4,7 @@
 //! many nodes and blocks it needs, so that threads fill disjoint slices.
 
 use super::{
-    node::{ChildRef, Node},
+    node::{ChildRef, Node, ranks},
     tree::Tree,
     triangles::{BLOCK_SIZE, Block, Triangles},
 };
@@ -16,7 +16,7 @@ use crate::{
         tasks,
     },
     error::BuildError,
-    simd::stack::MAX_LEVELS,
+    simd::{prefetch, stack::MAX_LEVELS},
 };
 
 /// Where the parts of a finished build are found.
@@ -26,6 +26,9 @@ pub(crate) struct Source<'a> {
     pub(crate) leaves: &'a [LeafReference],
     pub(crate) triangles: Triangles<'a>,
 }
+
+/// Every so many records begin another cache line, or nearly so.
+const RECORDS_PER_LINE: usize = 64 / size_of::<Record>();
 
 /// The part of the arrays that a subtree fills.
 struct Slots<'a, const N: usize, const W: usize, B> {
@@ -70,18 +73,10 @@ impl Source<'_> {
             level: 1,
         };
         match root.kind {
-            Kind::Inner => self.node(root, slots),
+            Kind::Inner => self.child(root, slots),
             Kind::Leaf => self.children(std::slice::from_ref(root), slots),
         }
         Ok(tree)
-    }
-
-    fn node<const N: usize, const W: usize, B: Block>(
-        &self,
-        record: &Record,
-        slots: Slots<'_, N, W, B>,
-    ) {
-        self.children(&self.records[record.range()], slots);
     }
 
     fn children<const N: usize, const W: usize, B: Block>(
@@ -91,54 +86,100 @@ impl Source<'_> {
     ) {
         // The stack of a traversal has room for so many levels and no more.
         assert!(slots.level < MAX_LEVELS, "the builder keeps max_depth");
-        let mut order: [usize; N] = std::array::from_fn(|i| i);
-        let order = &mut order[..children.len()];
-        let area = |&i: &usize| half_area(&children[i].bounds());
-        order.sort_by(|a, b| area(a).total_cmp(&area(b)));
-        let mut node_children = [(Aabb::EMPTY, ChildRef::inner(0)); N];
-        let mut jobs: [Option<(&Record, Slots<'_, N, W, B>)>; N] = [const { None }; N];
+        // What is read below and in the children lies all over memory: it is asked for in rounds,
+        // so that the ways to it overlap.
+        for child in children {
+            match child.kind {
+                Kind::Inner => {
+                    let records = &self.records[child.range()];
+                    records.iter().step_by(RECORDS_PER_LINE).for_each(prefetch);
+                }
+                Kind::Leaf => self.leaves[child.range()]
+                    .iter()
+                    .for_each(|&leaf| self.triangles.prefetch_triangle(leaf)),
+            }
+        }
+        let mut area = [f32::INFINITY; N];
+        for (area, child) in area.iter_mut().zip(children) {
+            *area = half_area(&child.bounds());
+        }
+        let mut order = [0; N];
+        for (child, &place) in ranks(&area).iter().enumerate() {
+            order[place as usize] = child;
+        }
+        let order = &order[..children.len()];
         let (own, mut nodes) = slots
             .nodes
             .split_first_mut()
             .expect("a subtree has room for its node");
-        let (mut blocks, mut node, mut block) =
-            (slots.blocks, slots.first_node + 1, slots.first_block);
-        for (slot, &index) in order.iter().enumerate() {
+        let mut node_children = [(Aabb::EMPTY, ChildRef::inner(0)); N];
+        let (mut node, mut block) = (slots.first_node + 1, slots.first_block);
+        for (own, &index) in node_children.iter_mut().zip(order) {
             let child = &children[index];
             let reference = match child.kind {
                 Kind::Inner => ChildRef::inner(node),
                 Kind::Leaf => ChildRef::leaf(block, child.blocks),
             };
-            node_children[slot] = (child.bounds(), reference);
-            let (child_nodes, other_nodes) = nodes.split_at_mut(child.nodes as usize);
-            let (child_blocks, other_blocks) = blocks.split_at_mut(child.blocks as usize);
-            jobs[slot] = Some((
-                child,
-                Slots {
-                    nodes: child_nodes,
-                    blocks: child_blocks,
-                    first_node: node,
-                    first_block: block,
-                    level: slots.level + 1,
-                },
-            ));
-            (nodes, blocks) = (other_nodes, other_blocks);
+            *own = (child.bounds(), reference);
             node += child.nodes;
             block += child.blocks;
         }
-        *own = Node::new(&node_children[..order.len()]);
-        self.run(&mut jobs[..order.len()]);
+        *own = Node::new(&node_children[..children.len()]);
+        if !B::INDEXED {
+            for child in children.iter().filter(|child| child.kind == Kind::Leaf) {
+                for &leaf in &self.leaves[child.range()] {
+                    self.triangles.prefetch_vertices(leaf);
+                }
+            }
+        }
+        let parallel = slots.blocks.len() * BLOCK_SIZE >= tasks::TASK_SIZE;
+        let mut jobs: [Option<(&Record, Slots<'_, N, W, B>)>; N] = [const { None }; N];
+        let (mut blocks, mut node, mut block) =
+            (slots.blocks, slots.first_node + 1, slots.first_block);
+        for (job, &index) in jobs.iter_mut().zip(order) {
+            let child = &children[index];
+            let (child_nodes, other_nodes) = nodes.split_at_mut(child.nodes as usize);
+            let (child_blocks, other_blocks) = blocks.split_at_mut(child.blocks as usize);
+            (nodes, blocks) = (other_nodes, other_blocks);
+            let child_slots = Slots {
+                nodes: child_nodes,
+                blocks: child_blocks,
+                first_node: node,
+                first_block: block,
+                level: slots.level + 1,
+            };
+            node += child.nodes;
+            block += child.blocks;
+            if parallel {
+                *job = Some((child, child_slots));
+            } else {
+                self.child(child, child_slots);
+            }
+        }
+        if parallel {
+            self.run(&mut jobs[..children.len()]);
+        }
     }
 
+    fn child<const N: usize, const W: usize, B: Block>(
+        &self,
+        record: &Record,
+        slots: Slots<'_, N, W, B>,
+    ) {
+        match record.kind {
+            Kind::Inner => self.children(&self.records[record.range()], slots),
+            Kind::Leaf => self.leaf(record, slots.blocks),
+        }
+    }
+
+    /// Fills subtrees at the same time.
     fn run<const N: usize, const W: usize, B: Block>(
         &self,
         jobs: &mut [Option<(&Record, Slots<'_, N, W, B>)>],
     ) {
         if let [job] = jobs {
-            match job.take() {
-                Some((record, slots)) if record.kind == Kind::Inner => self.node(record, slots),
-                Some((record, slots)) => self.leaf(record, slots.blocks),
-                None => {}
+            if let Some((record, slots)) = job.take() {
+                self.child(record, slots);
             }
             return;
         }

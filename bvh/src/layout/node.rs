@@ -108,45 +108,40 @@ impl<const N: usize, const W: usize> Node<N, W> {
     /// Makes a node of boxes and references, which must come in ascending order of area.
     pub(crate) fn new(children: &[(Aabb, ChildRef)]) -> Self {
         let mut node = Self::default();
+        let mut centres = [[0.0; N]; 3];
         for (slot, (bounds, reference)) in children.iter().enumerate() {
-            for axis in 0..3 {
+            for (axis, centres) in centres.iter_mut().enumerate() {
                 node.planes[2 * axis][slot] = bounds.min[axis];
                 node.planes[2 * axis + 1][slot] = bounds.max[axis];
+                centres[slot] = bounds.min[axis] + bounds.max[axis];
             }
             node.children[slot] = reference.0;
         }
-        let centres: [[f32; 3]; N] = std::array::from_fn(|slot| match children.get(slot) {
-            Some((bounds, _)) => (bounds.min + bounds.max).to_array(),
-            None => [0.0; 3],
-        });
         // Opposite octants see the children in opposite order, so that four sorts serve eight.
         for octant in 0..4 {
             let sign = |axis: usize| if octant >> axis & 1 == 1 { -1.0 } else { 1.0 };
-            let mut slots: [u32; N] = std::array::from_fn(|slot| slot as u32);
-            let key = |slot: &u32| {
-                let c = centres[*slot as usize];
-                c[0] * sign(0) + c[1] * sign(1) + c[2] * sign(2)
-            };
-            // Insertion sort, farthest first: at most sixteen elements, and stable.
-            for i in 1..children.len() {
-                let mut at = i;
-                while at > 0 && key(&slots[at - 1]) < key(&slots[at]) {
-                    slots.swap(at - 1, at);
-                    at -= 1;
-                }
+            let signs = [sign(0), sign(1), sign(2)];
+            let mut nearness = [f32::INFINITY; N];
+            for slot in 0..children.len() {
+                let [x, y, z] = [0, 1, 2].map(|axis| centres[axis][slot] * signs[axis]);
+                nearness[slot] = -(x + y + z);
             }
-            node.set_order(octant, &slots);
-            slots[..children.len()].reverse();
-            node.set_order(7 - octant, &slots);
+            let (mut far_first, mut near_first) = (0, 0);
+            for (slot, &place) in ranks(&nearness).iter().enumerate() {
+                let opposite = match children.len() {
+                    n if slot < n => n as u32 - 1 - place,
+                    _ => slot as u32,
+                };
+                far_first |= (slot as u64) << (place * Self::SLOT_BITS);
+                near_first |= (slot as u64) << (opposite * Self::SLOT_BITS);
+            }
+            node.set_order(octant, far_first);
+            node.set_order(7 - octant, near_first);
         }
         node
     }
 
-    fn set_order(&mut self, octant: usize, slots: &[u32; N]) {
-        let mut order = 0;
-        for (place, &slot) in slots.iter().enumerate() {
-            order |= u64::from(slot) << (place as u32 * Self::SLOT_BITS);
-        }
+    fn set_order(&mut self, octant: usize, order: u64) {
         let bit = octant * Self::OCTANT_BITS;
         self.order[bit / 32] |= (order as u32) << (bit % 32);
         if Self::OCTANT_BITS > 32 {
@@ -162,6 +157,20 @@ impl<const N: usize, const W: usize> Node<N, W> {
             max: glam::Vec3::new(plane(1), plane(3), plane(5)),
         }
     }
+}
+
+/// The place of each key in ascending order, equal keys in the order in which they come. All pairs
+/// are compared, which for so few is faster than sorting, since nothing depends on the outcome of a
+/// comparison but a sum.
+pub(super) fn ranks<const N: usize>(keys: &[f32; N]) -> [u32; N] {
+    let mut ranks = [0; N];
+    for (other, &other_key) in keys.iter().enumerate() {
+        for (slot, &key) in keys.iter().enumerate() {
+            let precedes = (other_key < key) | ((other_key == key) & (other < slot));
+            ranks[slot] += u32::from(precedes);
+        }
+    }
+    ranks
 }
 
 #[cfg(test)]

@@ -13,7 +13,11 @@
 
 use glam::Vec3;
 
-use crate::{build::LeafReference, mesh::TriangleMesh, simd::Lanes};
+use crate::{
+    build::LeafReference,
+    mesh::TriangleMesh,
+    simd::{Lanes, prefetch},
+};
 
 /// How many triangles a block holds.
 pub(crate) const BLOCK_SIZE: usize = 4;
@@ -56,6 +60,22 @@ impl Triangles<'_> {
         let geometry_id = leaf.geometry_id as usize;
         let first = self.first_points[geometry_id];
         self.meshes[geometry_id].triangles()[leaf.primitive_id as usize].map(|i| first + i)
+    }
+
+    /// Asks for the vertex numbers of a triangle before they are needed.
+    #[inline]
+    pub(crate) fn prefetch_triangle(&self, leaf: LeafReference) {
+        let mesh = self.meshes[leaf.geometry_id as usize];
+        prefetch(&mesh.triangles()[leaf.primitive_id as usize]);
+    }
+
+    /// Asks for the vertices of a triangle before they are needed.
+    #[inline]
+    pub(crate) fn prefetch_vertices(&self, leaf: LeafReference) {
+        let mesh = self.meshes[leaf.geometry_id as usize];
+        for index in mesh.triangles()[leaf.primitive_id as usize] {
+            prefetch(&mesh.vertices()[index as usize]);
+        }
     }
 
     /// All vertices, and one for the unused lanes at the end.
@@ -129,17 +149,43 @@ pub(crate) struct IndexBlock {
 }
 
 fn ids_of(leaves: &[LeafReference], triangles: &Triangles<'_>) -> [u32; BLOCK_SIZE] {
-    std::array::from_fn(|lane| {
-        let leaf = leaves.get(lane);
-        leaf.map_or(NO_TRIANGLE, |&leaf| triangles.id(leaf))
-    })
+    let mut ids = [NO_TRIANGLE; BLOCK_SIZE];
+    for (id, &leaf) in ids.iter_mut().zip(leaves) {
+        *id = triangles.id(leaf);
+    }
+    ids
 }
 
-fn corners_of(leaves: &[LeafReference], triangles: &Triangles<'_>) -> [[Vec3; 3]; BLOCK_SIZE] {
-    std::array::from_fn(|lane| {
-        let leaf = leaves.get(lane);
-        leaf.map_or([Vec3::splat(UNUSED); 3], |&leaf| triangles.corners(leaf))
-    })
+/// Corner by corner, one vector per lane.
+fn corners_of(leaves: &[LeafReference], triangles: &Triangles<'_>) -> [[Vec3; BLOCK_SIZE]; 3] {
+    let mut corners = [[Vec3::splat(UNUSED); BLOCK_SIZE]; 3];
+    for (lane, &leaf) in leaves.iter().enumerate().take(BLOCK_SIZE) {
+        for (corner, vertex) in triangles.corners(leaf).into_iter().enumerate() {
+            corners[corner][lane] = vertex;
+        }
+    }
+    corners
+}
+
+/// One vector per lane, component by component.
+fn rows(lanes: &[Vec3; BLOCK_SIZE]) -> Rows {
+    let [a, b, c, d] = lanes;
+    [
+        [a.x, b.x, c.x, d.x],
+        [a.y, b.y, c.y, d.y],
+        [a.z, b.z, c.z, d.z],
+    ]
+}
+
+/// Row by row, the difference of two vectors per lane.
+fn difference_of(a: &Rows, b: &Rows) -> Rows {
+    let mut difference = *a;
+    for (row, other) in difference.iter_mut().zip(b) {
+        for (value, other) in row.iter_mut().zip(other) {
+            *value -= other;
+        }
+    }
+    difference
 }
 
 #[inline(always)]
@@ -147,20 +193,15 @@ fn load<L: Lanes<4>>([x, y, z]: &Rows) -> [L; 3] {
     [L::load(x), L::load(y), L::load(z)]
 }
 
-/// One vector per lane, component by component.
-fn rows(lanes: [Vec3; BLOCK_SIZE]) -> Rows {
-    std::array::from_fn(|axis| lanes.map(|v| v[axis]))
-}
-
 impl Block for EdgeBlock {
     const INDEXED: bool = false;
 
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
-        let corners = corners_of(leaves, triangles);
+        let [a, b, c] = corners_of(leaves, triangles).each_ref().map(rows);
         Self {
-            vertex: rows(corners.map(|[a, _, _]| a)),
-            edge_1: rows(corners.map(|[a, b, _]| a - b)),
-            edge_2: rows(corners.map(|[a, _, c]| c - a)),
+            vertex: a,
+            edge_1: difference_of(&a, &b),
+            edge_2: difference_of(&c, &a),
             id: ids_of(leaves, triangles),
         }
     }
@@ -182,9 +223,8 @@ impl Block for CornerBlock {
     const INDEXED: bool = false;
 
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
-        let corners = corners_of(leaves, triangles);
         Self {
-            corners: std::array::from_fn(|corner| rows(corners.map(|c| c[corner]))),
+            corners: corners_of(leaves, triangles).each_ref().map(rows),
             id: ids_of(leaves, triangles),
         }
     }
@@ -211,14 +251,14 @@ impl Block for IndexBlock {
     const INDEXED: bool = true;
 
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
-        let numbers: [[u32; 3]; BLOCK_SIZE] = std::array::from_fn(|lane| {
-            let leaf = leaves.get(lane);
-            leaf.map_or([triangles.unused_point(); 3], |&leaf| {
-                triangles.point_numbers(leaf)
-            })
-        });
+        let mut points = [[triangles.unused_point(); BLOCK_SIZE]; 3];
+        for (lane, &leaf) in leaves.iter().enumerate().take(BLOCK_SIZE) {
+            for (corner, number) in triangles.point_numbers(leaf).into_iter().enumerate() {
+                points[corner][lane] = number;
+            }
+        }
         Self {
-            points: std::array::from_fn(|corner| numbers.map(|n| n[corner])),
+            points,
             id: ids_of(leaves, triangles),
         }
     }
