@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::{
     any_tree::AnyTree,
     bounds::Aabb,
-    build::{BuildWorkspace, primitive::PrimitiveRef, recursion},
+    build::{self, BuildWorkspace, LeafReference, primitive::PrimitiveRef},
     error::BuildError,
     layout::{emit::Source, triangles::Triangles},
     mesh::{MeshError, TriangleMesh},
@@ -72,7 +72,12 @@ impl Bvh {
                     PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
                 }));
         }
-        let root = recursion::build(workspace, params)?;
+        let corners = |leaf: LeafReference| {
+            meshes[leaf.geometry_id as usize]
+                .corners(leaf.primitive_id)
+                .map(|v| v * scale)
+        };
+        let root = build::build(workspace, Some(corners), params)?;
         let source = Source {
             root,
             records: &workspace.records,

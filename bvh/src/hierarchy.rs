@@ -9,10 +9,9 @@ use glam::Vec3;
 use crate::{
     bounds::Aabb,
     build::{
-        BuildWorkspace, LeafReference,
+        self, BuildWorkspace, LeafReference,
         primitive::PrimitiveRef,
         record::{Kind, Record},
-        recursion,
     },
     error::BuildError,
     params::BuildParams,
@@ -60,14 +59,13 @@ impl Hierarchy {
         workspace: &mut BuildWorkspace,
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
-        let _ = corners;
         workspace.references.clear();
         workspace.references.extend(
             primitives
                 .iter()
                 .map(|p| PrimitiveRef::new(p.bounds, p.geometry_id, p.primitive_id)),
         );
-        let root = recursion::build(workspace, params)?;
+        let root = build::build(workspace, corners, params)?;
         Ok(Self {
             records: workspace.records.clone(),
             leaves: workspace.leaves.clone(),

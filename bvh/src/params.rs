@@ -128,7 +128,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["binned-sah"],
+            &["morton", "binned-sah", "spatial-splits"],
         ),
         tuned: ParameterRange::Words(
             &[
@@ -138,7 +138,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["binned-sah"],
+            &["morton", "binned-sah", "spatial-splits"],
         ),
         changes_hits: false,
         meaning: "how primitives are divided into subtrees",
@@ -589,7 +589,7 @@ mod tests {
     #[test]
     fn all_faults_are_reported_at_once() {
         let params = BuildParams {
-            quality: Quality::Morton,
+            quality: Quality::Optimized,
             branching_factor: 17,
             max_depth: 0,
             sah_block_size: 0,
@@ -607,14 +607,14 @@ mod tests {
     #[test]
     fn what_is_not_built_yet_is_named() {
         let params = BuildParams {
-            quality: Quality::SpatialSplits,
+            quality: Quality::Optimized,
             ..BuildParams::default()
         };
         assert!(matches!(
             params.faults()[..],
             [ParameterFault::NotBuiltYet {
                 name: "quality",
-                value: "spatial-splits",
+                value: "optimized",
                 ..
             }]
         ));

@@ -4,9 +4,9 @@
 
 use std::{io::Read, path::Path};
 
-use raywright_bvh::{Accuracy, BuildParams, Bvh, TriangleMesh, Vec3};
+use raywright_bvh::{Accuracy, BuildParams, Bvh, Quality, TriangleMesh, Vec3};
 
-/// All triangles of a file that has only triangles, degenerate ones too, since Embree keeps them.
+/// All triangles of a file, polygons as fans; degenerate ones too, since Embree keeps them.
 fn read(path: &Path) -> Option<TriangleMesh> {
     let mut text = String::new();
     flate2::read::GzDecoder::new(std::fs::File::open(path).ok()?)
@@ -23,7 +23,9 @@ fn read(path: &Path) -> Option<TriangleMesh> {
             Some("f") => {
                 let index = |w: &str| w.split('/').next().unwrap().parse::<u32>().unwrap() - 1;
                 let corners: Vec<u32> = words.map(index).collect();
-                triangles.push(corners.try_into().unwrap());
+                for k in 2..corners.len() {
+                    triangles.push([corners[0], corners[k - 1], corners[k]]);
+                }
             }
             _ => {}
         }
@@ -56,23 +58,69 @@ fn compact_leaves_take_little_memory() {
 
 #[test]
 fn nodes_leaves_depth_and_cost_are_embrees() {
-    // Scene, branching factor, inner nodes, leaves, SAH of nodes, SAH of blocks, fill, depth.
+    let medium = BuildParams::embree_scene_medium();
+    let high = BuildParams::embree_scene_high();
+    let morton = BuildParams::embree_mesh_morton();
+    let mut compact = BuildParams::embree_scene_medium();
+    compact.branching_factor = 4;
+    // Scene, settings, inner nodes, leaves, SAH of nodes, SAH of blocks, fill, depth.
     let expected = [
-        ("sponza", 8, 15_053, 63_191, 13.810, 9.092, 0.6497, 13),
-        ("sponza", 4, 23_278, 58_017, 21.603, 9.674, 0.8731, 18),
-        ("fireplace_room", 8, 9_008, 35_058, 8.683, 3.865, 0.6115, 11),
+        ("sponza", medium, 15_053, 63_191, 13.810, 9.092, 0.650, 13),
+        ("sponza", compact, 23_278, 58_017, 21.603, 9.674, 0.873, 18),
+        ("sponza", high, 16_658, 70_523, 11.683, 9.052, 0.654, 12),
+        ("sponza", morton, 27_953, 89_874, 22.818, 9.241, 0.527, 9),
+        (
+            "sponza_dabrovic",
+            medium,
+            3_953,
+            16_710,
+            13.387,
+            8.094,
+            0.653,
+            10,
+        ),
+        (
+            "sponza_dabrovic",
+            high,
+            4_487,
+            19_022,
+            10.952,
+            7.211,
+            0.655,
+            10,
+        ),
+        (
+            "fireplace_room",
+            medium,
+            9_008,
+            35_058,
+            8.683,
+            3.865,
+            0.6115,
+            11,
+        ),
+        (
+            "fireplace_room",
+            high,
+            10_031,
+            39_527,
+            7.989,
+            3.738,
+            0.618,
+            11,
+        ),
     ];
-    for (name, branching_factor, nodes, leaves, sah_nodes, sah_blocks, fill, depth) in expected {
+    for (name, params, nodes, leaves, sah_nodes, sah_blocks, fill, depth) in expected {
         let Some(mesh) = scene(name) else { continue };
-        let mut params = BuildParams::embree_scene_medium();
-        params.branching_factor = branching_factor;
         let stats = Bvh::build(&[&mesh], &params).unwrap().stats();
         assert_eq!(
             (stats.nodes, stats.leaves, stats.depth),
             (nodes, leaves, depth),
-            "{name}"
+            "{name}: {stats:?}"
         );
-        assert_eq!(stats.references, mesh.triangles().len());
+        if params.quality != Quality::SpatialSplits {
+            assert_eq!(stats.references, mesh.triangles().len());
+        }
         assert!(
             (stats.sah_nodes - sah_nodes).abs() < 5.1e-4,
             "{name}: {}",
@@ -84,7 +132,7 @@ fn nodes_leaves_depth_and_cost_are_embrees() {
             stats.sah_blocks
         );
         assert!(
-            (stats.node_fill - fill).abs() < 5.1e-5,
+            (stats.node_fill - fill).abs() < 5.1e-4,
             "{name}: {}",
             stats.node_fill
         );

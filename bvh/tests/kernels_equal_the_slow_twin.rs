@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use raywright_bvh::{
-    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Ray, TriangleMesh, Vec3,
+    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Quality, Ray, TriangleMesh, Vec3,
     reference,
 };
 
@@ -103,10 +103,17 @@ fn params() -> impl Strategy<Value = BuildParams> {
         1u32..=64,
         0f32..10.0,
         0f32..10.0,
+        prop::sample::select(vec![
+            Quality::Morton,
+            Quality::BinnedSah,
+            Quality::SpatialSplits,
+        ]),
     )
         .prop_map(
-            |(depth, block, min_leaf, max_leaf, traversal, intersection)| {
+            |(depth, block, min_leaf, max_leaf, traversal, intersection, quality)| {
                 let mut params = BuildParams::default();
+                params.quality = quality;
+                params.split_budget = 2.0;
                 params.max_depth = depth;
                 params.sah_block_size = block;
                 params.min_leaf_size = min_leaf;

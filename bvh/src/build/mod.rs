@@ -1,12 +1,64 @@
 //! From boxes of primitives to a binary or wide tree of records, whatever the layout in memory
 //! that is made of it afterwards.
 
+use glam::Vec3;
+
+use crate::{
+    error::BuildError,
+    params::{BuildParams, Quality, Rounding},
+};
+use binning::{AsEmbree, Exact};
+
 pub(crate) mod binning;
+mod introsort;
+mod morton;
 pub(crate) mod partition;
 pub(crate) mod primitive;
+mod radix;
 pub(crate) mod record;
 pub(crate) mod recursion;
+mod spatial;
 pub(crate) mod tasks;
+
+/// Builds the records of a tree over `workspace.references` with valid parameters. `corners` gives
+/// the triangle of a primitive; without it no primitive is cut. Returns the root, if there is any.
+pub(crate) fn build<C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
+    workspace: &mut BuildWorkspace,
+    corners: Option<C>,
+    params: &BuildParams,
+) -> Result<Option<record::Record>, BuildError> {
+    if workspace.references.is_empty() {
+        return Ok(None);
+    }
+    match params.rounding {
+        Rounding::Exact => build_rounded::<Exact, C>(workspace, corners, params),
+        Rounding::Embree => build_rounded::<AsEmbree, C>(workspace, corners, params),
+    }
+    .map(Some)
+}
+
+fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
+    workspace: &mut BuildWorkspace,
+    corners: Option<C>,
+    params: &BuildParams,
+) -> Result<record::Record, BuildError> {
+    let n = workspace.references.len();
+    match (params.quality, corners) {
+        (Quality::SpatialSplits, Some(corners)) => {
+            let capacity = (f64::from(params.split_budget) * n as f64) as usize;
+            let can_cut = |reference: &primitive::PrimitiveRef| {
+                reference.geometry_id() < primitive::CUT_ID_LIMIT
+            };
+            if capacity > n && workspace.references.iter().all(can_cut) {
+                recursion::build_with_cuts::<R, C>(workspace, params, capacity, corners)
+            } else {
+                recursion::build::<R>(workspace, params)
+            }
+        }
+        (Quality::Morton, _) => morton::build::<R>(workspace, params),
+        _ => recursion::build::<R>(workspace, params),
+    }
+}
 
 /// A primitive in a leaf.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -24,6 +76,8 @@ pub struct BuildWorkspace {
     pub(crate) scratch: Vec<primitive::PrimitiveRef>,
     pub(crate) leaves: Vec<LeafReference>,
     pub(crate) records: Vec<record::Record>,
+    pub(crate) keys: Vec<u64>,
+    pub(crate) keys_scratch: Vec<u64>,
 }
 
 impl BuildWorkspace {
@@ -34,5 +88,6 @@ impl BuildWorkspace {
             * size_of::<primitive::PrimitiveRef>()
             + self.leaves.capacity() * size_of::<LeafReference>()
             + self.records.capacity() * size_of::<record::Record>()
+            + (self.keys.capacity() + self.keys_scratch.capacity()) * size_of::<u64>()
     }
 }

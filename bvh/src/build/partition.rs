@@ -1,14 +1,19 @@
 //! Divides a range of references in two, and finds the bounds of both sides on the way.
 //!
-//! Small ranges are divided in place by two pointers. Large ones are divided by all threads from
-//! one buffer into the other: pieces are counted, every piece gets its place on either side, and
-//! all are copied at once. The order within a side differs between the two and has no influence on
-//! the tree (leaves are sorted).
+//! [`stable`] keeps the order within a side and has no branch that depends on the data. Large
+//! ranges are divided by all threads from one buffer into the other: pieces are counted, every
+//! piece gets its place on either side, and all are copied at once; the order is that of `stable`.
+//! [`in_place`] is the classical exchange of two pointers that Embree uses, whose order its trees
+//! with cut primitives depend on.
 
 use super::{
     binning::Split,
-    primitive::{PrimitiveRef, RangeBounds},
+    primitive::{Bounds, BoxLanes, PrimitiveRef, RangeBounds},
     tasks,
+};
+use crate::simd::{
+    self, Isa,
+    build::{EightLanes, Halves},
 };
 
 /// The two sides of a partition.
@@ -18,16 +23,30 @@ pub(crate) struct Partition {
     pub(crate) bounds: [RangeBounds; 2],
 }
 
+impl Partition {
+    /// A partition by a split that knows the boxes of its sides.
+    fn new(left: usize, split: &Split, centroids: [Bounds; 2]) -> Self {
+        let bounds = std::array::from_fn(|side| RangeBounds {
+            geometry: split.sides[side],
+            centroid: centroids[side],
+        });
+        Self { left, bounds }
+    }
+}
+
 /// Divides in place: two pointers that walk towards each other.
-pub(crate) fn in_place(references: &mut [PrimitiveRef], split: &Split) -> Partition {
+pub(crate) fn in_place(
+    references: &mut [PrimitiveRef],
+    is_left: impl Fn(&PrimitiveRef) -> bool,
+) -> Partition {
     let (mut left, mut right) = (0, references.len());
     let mut bounds = [RangeBounds::EMPTY; 2];
     loop {
-        while left < right && split.is_left(&references[left]) {
+        while left < right && is_left(&references[left]) {
             bounds[0].extend(&references[left]);
             left += 1;
         }
-        while left < right && !split.is_left(&references[right - 1]) {
+        while left < right && !is_left(&references[right - 1]) {
             bounds[1].extend(&references[right - 1]);
             right -= 1;
         }
@@ -38,19 +57,84 @@ pub(crate) fn in_place(references: &mut [PrimitiveRef], split: &Split) -> Partit
     }
 }
 
+/// Divides in place and keeps the order within each side; `scratch` is as long as `references`.
+pub(crate) fn stable(
+    references: &mut [PrimitiveRef],
+    scratch: &mut [PrimitiveRef],
+    split: &Split,
+    isa: Isa,
+) -> Partition {
+    let kernel = Stable {
+        references,
+        scratch,
+        split,
+    };
+    simd::build::run(isa, kernel)
+}
+
+struct Stable<'a> {
+    references: &'a mut [PrimitiveRef],
+    scratch: &'a mut [PrimitiveRef],
+    split: &'a Split,
+}
+
+impl EightLanes for Stable<'_> {
+    type Output = Partition;
+
+    #[inline(always)]
+    fn run<L: Halves>(self) -> Partition {
+        let mut centroids = [L::of(&Bounds::EMPTY); 2];
+        let (mut left, mut right) = (0, 0);
+        let Self {
+            references,
+            scratch,
+            split,
+        } = self;
+        let scratch = &mut scratch[..references.len()];
+        for index in 0..references.len() {
+            let behind = split.behind(&references[index]);
+            let lanes = L::of(&references[index].0);
+            // Both places are written; the counters say which of them counts. The left one has
+            // been read already.
+            references[left] = PrimitiveRef(lanes.to_bounds());
+            scratch[right] = PrimitiveRef(lanes.to_bounds());
+            let is_left = (behind.to_bits() >> 31) as usize;
+            left += is_left;
+            right += 1 - is_left;
+            extend_side(&mut centroids, lanes.doubled_centroid(), behind);
+        }
+        references[left..].copy_from_slice(&scratch[..right]);
+        Partition::new(left, split, centroids.map(BoxLanes::to_bounds))
+    }
+}
+
+/// Adds a box to the first of two where `behind` is negative, otherwise to the second; without a
+/// branch, since nobody can predict it: the other gets a box that changes nothing.
+#[inline(always)]
+fn extend_side<L: Halves>(sides: &mut [L; 2], bounds: L, behind: f32) {
+    // A minimum with −∞ in place keeps the box and with +∞ drops it; they differ in the sign.
+    let sign = behind.to_bits() & 1 << 31;
+    let infinity = f32::INFINITY.to_bits();
+    let (left, right) = (infinity | sign, infinity | sign ^ 1 << 31);
+    sides[0] = sides[0].min(bounds.max(L::splat(f32::from_bits(left))));
+    sides[1] = sides[1].min(bounds.max(L::splat(f32::from_bits(right))));
+}
+
 /// Divides from one buffer into another of the same length, in pieces.
 pub(crate) fn into_buffer(
     from: &[PrimitiveRef],
     to: &mut [PrimitiveRef],
     split: &Split,
+    isa: Isa,
 ) -> Partition {
     let pieces: Vec<&[PrimitiveRef]> = from.chunks(tasks::PIECE_SIZE).collect();
     let mut lefts = vec![0; pieces.len()];
     count_left(&pieces, &mut lefts, split);
     let left = lefts.iter().sum();
     let (to_left, to_right) = to.split_at_mut(left);
-    let bounds = copy_pieces(&pieces, &lefts, [to_left, to_right], split);
-    Partition { left, bounds }
+    let to_right = &mut to_right[..from.len() - left];
+    let centroids = copy_pieces(&pieces, &lefts, [to_left, to_right], split, isa);
+    Partition::new(left, split, centroids)
 }
 
 fn count_left(pieces: &[&[PrimitiveRef]], lefts: &mut [usize], split: &Split) {
@@ -72,42 +156,59 @@ fn copy_pieces(
     lefts: &[usize],
     [to_left, to_right]: [&mut [PrimitiveRef]; 2],
     split: &Split,
-) -> [RangeBounds; 2] {
+    isa: Isa,
+) -> [Bounds; 2] {
     if let [piece] = pieces {
-        let mut bounds = [RangeBounds::EMPTY; 2];
-        let (mut left, mut right) = (to_left.iter_mut(), to_right.iter_mut());
-        for reference in *piece {
-            let side = usize::from(!split.is_left(reference));
-            bounds[side].extend(reference);
-            // The counts were taken with the same test, so that neither side runs out.
-            if let Some(place) = if side == 0 { left.next() } else { right.next() } {
-                *place = *reference;
-            }
-        }
-        return bounds;
+        let kernel = CopyPiece {
+            piece,
+            to_left,
+            to_right,
+            split,
+        };
+        return simd::build::run(isa, kernel);
     }
     let middle = pieces.len() / 2;
     let left_count: usize = lefts[..middle].iter().sum();
     let right_count = pieces[..middle].iter().map(|p| p.len()).sum::<usize>() - left_count;
     let (left_a, left_b) = to_left.split_at_mut(left_count);
     let (right_a, right_b) = to_right.split_at_mut(right_count);
+    let (pieces_a, pieces_b) = pieces.split_at(middle);
+    let (lefts_a, lefts_b) = lefts.split_at(middle);
     let (a, b) = tasks::join(
-        || {
-            copy_pieces(
-                &pieces[..middle],
-                &lefts[..middle],
-                [left_a, right_a],
-                split,
-            )
-        },
-        || {
-            copy_pieces(
-                &pieces[middle..],
-                &lefts[middle..],
-                [left_b, right_b],
-                split,
-            )
-        },
+        || copy_pieces(pieces_a, lefts_a, [left_a, right_a], split, isa),
+        || copy_pieces(pieces_b, lefts_b, [left_b, right_b], split, isa),
     );
-    [a[0].merge(b[0]), a[1].merge(b[1])]
+    std::array::from_fn(|side| {
+        let mut bounds = a[side];
+        bounds.extend(&b[side]);
+        bounds
+    })
+}
+
+struct CopyPiece<'a> {
+    piece: &'a [PrimitiveRef],
+    to_left: &'a mut [PrimitiveRef],
+    to_right: &'a mut [PrimitiveRef],
+    split: &'a Split,
+}
+
+impl EightLanes for CopyPiece<'_> {
+    type Output = [Bounds; 2];
+
+    #[inline(always)]
+    fn run<L: Halves>(self) -> [Bounds; 2] {
+        let mut centroids = [L::of(&Bounds::EMPTY); 2];
+        let (mut left, mut right) = (self.to_left.iter_mut(), self.to_right.iter_mut());
+        for reference in self.piece {
+            let behind = self.split.behind(reference);
+            let is_left = behind.is_sign_negative();
+            let centroid = L::of(&reference.0).doubled_centroid();
+            extend_side(&mut centroids, centroid, behind);
+            // The counts were taken with the same test, so that neither side runs out.
+            if let Some(place) = if is_left { left.next() } else { right.next() } {
+                *place = *reference;
+            }
+        }
+        centroids.map(BoxLanes::to_bounds)
+    }
 }

@@ -6,6 +6,7 @@
 //! record array from the start, and threads never meet.
 
 use super::primitive::Bounds;
+use crate::{bounds::Aabb, layout::triangles::BLOCK_SIZE};
 
 /// What is behind a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,12 +41,12 @@ impl Record {
         kind: Kind::Leaf,
     };
 
-    pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize, blocks: u32) -> Self {
+    pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
         Self {
             first: first as u32,
             count: count as u32,
             nodes: 0,
-            blocks,
+            blocks: count.div_ceil(BLOCK_SIZE) as u32,
             kind: Kind::Leaf,
             ..Self::of(bounds)
         }
@@ -59,6 +60,18 @@ impl Record {
             blocks: children.iter().map(|c| c.blocks).sum(),
             kind: Kind::Inner,
             ..Self::of(bounds)
+        }
+    }
+
+    /// A node whose box is that of its children.
+    pub(crate) fn inner_around(first: usize, children: &[Self]) -> Self {
+        let bounds = children
+            .iter()
+            .fold(Aabb::EMPTY, |all, child| all.union(child.bounds()));
+        Self {
+            lower: bounds.min.to_array(),
+            upper: bounds.max.to_array(),
+            ..Self::inner(&Bounds::EMPTY, first, children)
         }
     }
 
@@ -77,8 +90,8 @@ impl Record {
         first..first + self.count as usize
     }
 
-    pub(crate) fn bounds(&self) -> crate::bounds::Aabb {
-        crate::bounds::Aabb {
+    pub(crate) fn bounds(&self) -> Aabb {
+        Aabb {
             min: self.lower.into(),
             max: self.upper.into(),
         }

@@ -6,64 +6,107 @@
 //! reference is in exactly one leaf; no leaf has more than `max_leaf_size` references; no level is
 //! deeper than `max_depth`, the root being level 1.
 
+use glam::Vec3;
+
 use super::{
     BuildWorkspace, LeafReference,
-    binning::{Split, find_split},
-    partition,
-    primitive::{PrimitiveRef, RangeBounds},
+    binning::{self, Rounding},
+    introsort, partition,
+    primitive::{Bounds, PrimitiveRef, RangeBounds},
     record::Record,
+    spatial::{self, Cutting, SpatialSplit},
     tasks,
 };
-use crate::{error::BuildError, layout::triangles::BLOCK_SIZE, params::BuildParams};
+use crate::{error::BuildError, params::BuildParams, simd::Isa};
 
 /// Levels kept free below a tree built by costs, in which oversized ranges are halved.
-const RESERVED_LEVELS: u32 = 8;
+pub(crate) const RESERVED_LEVELS: u32 = 8;
 
 /// The most children that a node can have.
-const MAX_CHILDREN: usize = 16;
+pub(crate) const MAX_CHILDREN: usize = 16;
 
-/// Builds the records of a tree over `workspace.references`. Returns the root.
-pub(crate) fn build(
+/// How primitives are found again that may be cut.
+pub(crate) type NoCorners = fn(LeafReference) -> [Vec3; 3];
+
+/// Builds the records of a tree over `workspace.references`, of which there is at least one.
+/// Returns the root.
+pub(crate) fn build<R: Rounding>(
     workspace: &mut BuildWorkspace,
     params: &BuildParams,
-) -> Result<Option<Record>, BuildError> {
+) -> Result<Record, BuildError> {
     let n = workspace.references.len();
-    if n == 0 {
-        return Ok(None);
-    }
-    workspace.scratch.resize(n, workspace.references[0]);
-    workspace.leaves.resize(n, LeafReference::default());
-    workspace.records.resize(2 * n - 2, Record::UNUSED);
-    let bounds = tasks::map_merge(&workspace.references, &RangeBounds::of, &RangeBounds::merge);
-    let builder = Builder {
+    run::<R, NoCorners>(workspace, params, n, None)
+}
+
+/// Builds the records of a tree over at most `capacity` parts of `workspace.references`, of which
+/// there is at least one.
+pub(crate) fn build_with_cuts<R: Rounding, C>(
+    workspace: &mut BuildWorkspace,
+    params: &BuildParams,
+    capacity: usize,
+    corners: C,
+) -> Result<Record, BuildError>
+where
+    C: Fn(LeafReference) -> [Vec3; 3] + Sync,
+{
+    let n = workspace.references.len();
+    spatial::give_budgets(&mut workspace.references);
+    workspace
+        .references
+        .resize(capacity, workspace.references[0]);
+    run::<R, C>(workspace, params, n, Some(corners))
+}
+
+fn run<R: Rounding, C>(
+    workspace: &mut BuildWorkspace,
+    params: &BuildParams,
+    n: usize,
+    corners: Option<C>,
+) -> Result<Record, BuildError>
+where
+    C: Fn(LeafReference) -> [Vec3; 3] + Sync,
+{
+    let capacity = workspace.references.len();
+    workspace.scratch.resize(capacity, workspace.references[0]);
+    workspace.leaves.resize(capacity, LeafReference::default());
+    workspace.records.resize(2 * capacity - 2, Record::UNUSED);
+    let bounds = tasks::map_merge(
+        &workspace.references[..n],
+        &RangeBounds::of,
+        &RangeBounds::merge,
+    );
+    let builder = Builder::<R, C> {
         params: params.canonical(),
         block_shift: params.sah_block_shift(),
+        isa: Isa::best(),
+        cutting: corners
+            .map(|corners| Cutting::new(corners, &bounds.geometry, R::EMPTY_SIDE_ENDS_BUDGET)),
+        rounding: std::marker::PhantomData,
     };
     let root = Range {
         references: &mut workspace.references,
         scratch: &mut workspace.scratch,
         leaves: &mut workspace.leaves,
+        len: n,
         begin: 0,
         bounds,
     };
-    builder
-        .subtree(
-            root,
-            Slots {
-                records: &mut workspace.records,
-                begin: 0,
-            },
-            1,
-        )
-        .map(Some)
+    let slots = Slots {
+        records: &mut workspace.records,
+        begin: 0,
+    };
+    builder.subtree(root, slots, &mut Memory::default(), 1)
 }
 
 /// A range of references, with all that belongs to it alone.
 struct Range<'a> {
+    /// The references, and behind them room for those that cuts make.
     references: &'a mut [PrimitiveRef],
-    /// As long as `references`; large partitions go back and forth between the two.
+    /// As long as `references`, between which and it large partitions go back and forth.
     scratch: &'a mut [PrimitiveRef],
     leaves: &'a mut [LeafReference],
+    /// How many references there are.
+    len: usize,
     /// Place of the first reference among all.
     begin: usize,
     bounds: RangeBounds,
@@ -75,34 +118,76 @@ struct Slots<'a> {
     begin: usize,
 }
 
+/// A way to divide a range.
+enum Split {
+    Object(binning::Split),
+    Spatial(SpatialSplit),
+}
+
+impl Split {
+    fn sah(&self) -> f32 {
+        match self {
+            Self::Object(split) => split.sah,
+            Self::Spatial(split) => split.sah,
+        }
+    }
+}
+
 impl<'a> Range<'a> {
     fn len(&self) -> usize {
-        self.references.len()
+        self.len
     }
 
-    fn sort(&mut self) {
-        self.references.sort_unstable_by_key(PrimitiveRef::sort_key);
+    fn references(&self) -> &[PrimitiveRef] {
+        &self.references[..self.len]
     }
 
+    fn room(&self) -> usize {
+        self.references.len() - self.len
+    }
+
+    fn sort<R: Rounding>(&mut self) {
+        let references = &mut self.references[..self.len];
+        if R::LIBRARY_ORDER {
+            introsort::sort(references, |a, b| a.sort_key() < b.sort_key());
+        } else {
+            references.sort_unstable_by_key(PrimitiveRef::sort_key);
+        }
+    }
+
+    /// Parts the range at place `middle`. Room for cuts is shared by what each side may still cut.
     fn split_at(self, middle: usize, bounds: [RangeBounds; 2]) -> [Self; 2] {
-        let (references, references_right) = self.references.split_at_mut(middle);
-        let (scratch, scratch_right) = self.scratch.split_at_mut(middle);
-        let (leaves, leaves_right) = self.leaves.split_at_mut(middle);
-        let begin = self.begin;
+        let (len, mut right_begin) = (self.len, middle);
+        if self.room() > 0 {
+            let (left, right) = self.references().split_at(middle);
+            let left_room = spatial::room_of_left(left, right, self.room());
+            // The right side moves up; only what would be overwritten has to.
+            if left_room < len - middle {
+                self.references.copy_within(middle..middle + left_room, len);
+            } else {
+                self.references.copy_within(middle..len, middle + left_room);
+            }
+            right_begin += left_room;
+        }
+        let (references, references_right) = self.references.split_at_mut(right_begin);
+        let (scratch, scratch_right) = self.scratch.split_at_mut(right_begin);
+        let (leaves, leaves_right) = self.leaves.split_at_mut(right_begin);
         let [left, right] = bounds;
         [
             Self {
                 references,
                 scratch,
                 leaves,
-                begin,
+                len: middle,
+                begin: self.begin,
                 bounds: left,
             },
             Self {
                 references: references_right,
                 scratch: scratch_right,
                 leaves: leaves_right,
-                begin: begin + middle,
+                len: len - middle,
+                begin: self.begin + right_begin,
                 bounds: right,
             },
         ]
@@ -111,37 +196,86 @@ impl<'a> Range<'a> {
     /// Halves the range where it stands. The middle is taken of the absolute places, as Embree
     /// does, so that the parity of the first place matters.
     fn halve(self) -> [Self; 2] {
-        let middle = (2 * self.begin + self.len()) / 2 - self.begin;
-        let (left, right) = self.references.split_at(middle);
+        let middle = (2 * self.begin + self.len) / 2 - self.begin;
+        let (left, right) = self.references().split_at(middle);
         let bounds = [RangeBounds::of(left), RangeBounds::of(right)];
         self.split_at(middle, bounds)
     }
-
-    /// Divides the range by a plane, or halves it in sorted order if there is none.
-    fn divide(mut self, split: Option<Split>) -> [Self; 2] {
-        let Some(split) = split else {
-            self.sort();
-            return self.halve();
-        };
-        let partition = if tasks::in_pieces(self.len()) {
-            let partition = partition::into_buffer(self.references, self.scratch, &split);
-            std::mem::swap(&mut self.references, &mut self.scratch);
-            partition
-        } else {
-            partition::in_place(self.references, &split)
-        };
-        self.split_at(partition.left, partition.bounds)
-    }
 }
 
-struct Builder {
+/// What is reused from range to range.
+#[derive(Default)]
+struct Memory {
+    bins: binning::BinPair,
+}
+
+/// Builds the subtree over a range at a level, the root being level 1.
+type BuildSubtree<B> = fn(&B, Range<'_>, Slots<'_>, &mut Memory, u32) -> Result<Record, BuildError>;
+
+struct Builder<R, C> {
     params: BuildParams,
     block_shift: u32,
+    isa: Isa,
+    /// How primitives are cut, if they are.
+    cutting: Option<Cutting<C>>,
+    rounding: std::marker::PhantomData<R>,
 }
 
-impl Builder {
-    fn find_split(&self, range: &Range<'_>) -> Option<Split> {
-        find_split(range.references, &range.bounds, self.block_shift)
+impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
+    fn find_split(&self, range: &Range<'_>, memory: &mut Memory) -> Option<Split> {
+        let (references, bounds) = (range.references(), &range.bounds);
+        let object = binning::find_split::<R>(
+            references,
+            bounds,
+            self.block_shift,
+            self.isa,
+            &mut memory.bins,
+        );
+        let Some(cutting) = self.cutting.as_ref().filter(|_| range.room() > 0) else {
+            return object.map(Split::Object);
+        };
+        let (object_sah, overlap) = match &object {
+            Some(split) => (split.sah, split.sides[0].intersection(&split.sides[1])),
+            None => (f32::INFINITY, Bounds::EMPTY),
+        };
+        let spatial = cutting.find_split::<R>(
+            references,
+            range.room(),
+            bounds,
+            object_sah,
+            &overlap,
+            self.block_shift,
+        );
+        spatial.map(Split::Spatial).or(object.map(Split::Object))
+    }
+
+    /// Divides the range by a plane, or halves it in sorted order if there is none.
+    fn divide<'a>(&self, mut range: Range<'a>, split: Option<Split>) -> [Range<'a>; 2] {
+        let partition = match (split, &self.cutting) {
+            (Some(Split::Object(split)), _) => {
+                let references = &mut range.references[..range.len];
+                if self.cutting.is_some() && R::LIBRARY_ORDER {
+                    partition::in_place(references, |reference| split.is_left(reference))
+                } else if tasks::in_pieces(range.len) {
+                    let partition =
+                        partition::into_buffer(references, range.scratch, &split, self.isa);
+                    std::mem::swap(&mut range.references, &mut range.scratch);
+                    partition
+                } else {
+                    partition::stable(references, range.scratch, &split, self.isa)
+                }
+            }
+            (Some(Split::Spatial(split)), Some(cutting)) => {
+                range.len = cutting.cut::<R>(range.references, range.len, &split);
+                let references = &mut range.references[..range.len];
+                partition::in_place(references, |reference| split.is_left::<R>(reference))
+            }
+            _ => {
+                range.sort::<R>();
+                return range.halve();
+            }
+        };
+        range.split_at(partition.left, partition.bounds)
     }
 
     fn blocks(&self, n: usize) -> f32 {
@@ -152,7 +286,7 @@ impl Builder {
     /// infinite cost of a missing plane) means that it does.
     fn leaf_is_cheap(&self, range: &Range<'_>, split: Option<&Split>) -> bool {
         let area = range.bounds.geometry.half_area();
-        let sah = split.map_or(f32::INFINITY, |split| split.sah);
+        let sah = split.map_or(f32::INFINITY, Split::sah);
         let leaf_cost = self.params.intersection_cost * (area * self.blocks(range.len()));
         let split_cost = self.params.traversal_cost * area + self.params.intersection_cost * sah;
         leaf_cost <= split_cost
@@ -163,21 +297,22 @@ impl Builder {
         &self,
         mut range: Range<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
         let at_limit = level + RESERVED_LEVELS >= self.params.max_depth;
         if n <= self.params.min_leaf_size as usize || at_limit {
-            range.sort();
-            return self.leaf_phase(range, slots, level);
+            range.sort::<R>();
+            return self.leaf_phase(range, slots, memory, level);
         }
-        let split = self.find_split(&range);
+        let split = self.find_split(&range, memory);
         if n <= self.params.max_leaf_size as usize && self.leaf_is_cheap(&range, split.as_ref()) {
-            range.sort();
-            return self.leaf_phase(range, slots, level);
+            range.sort::<R>();
+            return self.leaf_phase(range, slots, memory, level);
         }
         let bounds = range.bounds;
-        let mut children = Children::new(range.divide(split));
+        let mut children = Children::new(self.divide(range, split));
         while children.len() < self.params.branching_factor as usize {
             // The largest box first; ties keep the older child.
             let Some(largest) = children.best(
@@ -187,13 +322,13 @@ impl Builder {
                 break;
             };
             let child = children.take(largest);
-            let split = self.find_split(&child);
-            let [left, right] = child.divide(split);
+            let split = self.find_split(&child, memory);
+            let [left, right] = self.divide(child, split);
             children.put(largest, left);
             children.push(right);
         }
         children.sort_by_descending_size();
-        self.node(&bounds, children, slots, level, Self::subtree)
+        self.node(&bounds, children, slots, memory, level, Self::subtree)
     }
 
     /// Leaves, and halving without regard to cost where too many references are left. The
@@ -202,19 +337,24 @@ impl Builder {
         &self,
         range: Range<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
         let max_leaf_size = self.params.max_leaf_size as usize;
         if level > self.params.max_depth {
-            return Err(self.depth_error(n, level));
+            return Err(depth_error(&self.params, n, level));
         }
         if n <= max_leaf_size {
-            for (leaf, reference) in range.leaves.iter_mut().zip(&*range.references) {
-                *leaf = reference.leaf_reference();
+            let cuts = self.cutting.is_some();
+            for (leaf, reference) in range.leaves.iter_mut().zip(&range.references[..n]) {
+                *leaf = if cuts {
+                    reference.cut_leaf_reference()
+                } else {
+                    reference.leaf_reference()
+                };
             }
-            let blocks = n.div_ceil(BLOCK_SIZE) as u32;
-            return Ok(Record::leaf(&range.bounds.geometry, range.begin, n, blocks));
+            return Ok(Record::leaf(&range.bounds.geometry, range.begin, n));
         }
         let bounds = range.bounds;
         let mut children = Children::new(range.halve());
@@ -228,7 +368,7 @@ impl Builder {
             children.push(left);
             children.push(right);
         }
-        self.node(&bounds, children, slots, level, Self::leaf_phase)
+        self.node(&bounds, children, slots, memory, level, Self::leaf_phase)
     }
 
     /// Builds the children, at the same time where they are large, and records their node.
@@ -237,15 +377,16 @@ impl Builder {
         bounds: &RangeBounds,
         children: Children<'_>,
         slots: Slots<'_>,
+        memory: &mut Memory,
         level: u32,
-        build: fn(&Self, Range<'_>, Slots<'_>, u32) -> Result<Record, BuildError>,
+        build: BuildSubtree<Self>,
     ) -> Result<Record, BuildError> {
         let (own, mut rest) = slots.records.split_at_mut(children.len());
         let mut rest_begin = slots.begin + own.len();
         let mut jobs: [Option<(Range<'_>, Slots<'_>)>; MAX_CHILDREN] =
             [const { None }; MAX_CHILDREN];
         for (job, range) in jobs.iter_mut().zip(children.into_iter()) {
-            let needed = 2 * range.len() - 2;
+            let needed = 2 * range.references.len() - 2;
             let (records, others) = rest.split_at_mut(needed);
             *job = Some((
                 range,
@@ -258,54 +399,28 @@ impl Builder {
             rest_begin += needed;
         }
         let count = own.len();
-        self.run(&mut jobs[..count], own, level + 1, build)?;
+        tasks::fill_from_jobs(
+            &mut jobs[..count],
+            own,
+            memory,
+            &|(range, _): &(Range<'_>, Slots<'_>)| range.len,
+            &|(range, slots), memory| build(self, range, slots, memory, level + 1),
+        )?;
         Ok(Record::inner(&bounds.geometry, slots.begin, own))
     }
+}
 
-    fn run(
-        &self,
-        jobs: &mut [Option<(Range<'_>, Slots<'_>)>],
-        records: &mut [Record],
-        level: u32,
-        build: fn(&Self, Range<'_>, Slots<'_>, u32) -> Result<Record, BuildError>,
-    ) -> Result<(), BuildError> {
-        if let ([job], [record]) = (&mut *jobs, &mut *records) {
-            if let Some((range, slots)) = job.take() {
-                *record = build(self, range, slots, level)?;
-            }
-            return Ok(());
-        }
-        let middle = jobs.len() / 2;
-        let (jobs_a, jobs_b) = jobs.split_at_mut(middle);
-        let (records_a, records_b) = records.split_at_mut(middle);
-        let size: usize = jobs_a
-            .iter()
-            .chain(&*jobs_b)
-            .flatten()
-            .map(|(range, _)| range.len())
-            .sum();
-        if size < tasks::TASK_SIZE {
-            self.run(jobs_a, records_a, level, build)?;
-            return self.run(jobs_b, records_b, level, build);
-        }
-        let (a, b) = tasks::join(
-            || self.run(jobs_a, records_a, level, build),
-            || self.run(jobs_b, records_b, level, build),
-        );
-        a.and(b)
+/// Why `n` references do not fit below a level, and how many levels would surely be needed.
+pub(crate) fn depth_error(params: &BuildParams, n: usize, level: u32) -> BuildError {
+    let mut needed = level;
+    let mut capacity = u64::from(params.max_leaf_size);
+    while capacity < n as u64 {
+        capacity *= u64::from(params.branching_factor);
+        needed += 1;
     }
-
-    fn depth_error(&self, n: usize, level: u32) -> BuildError {
-        let mut needed = level;
-        let mut capacity = u64::from(self.params.max_leaf_size);
-        while capacity < n as u64 {
-            capacity *= u64::from(self.params.branching_factor);
-            needed += 1;
-        }
-        BuildError::DepthLimit {
-            max_depth: self.params.max_depth,
-            needed,
-        }
+    BuildError::DepthLimit {
+        max_depth: params.max_depth,
+        needed,
     }
 }
 

@@ -60,3 +60,44 @@ pub(crate) fn map_merge<T: Sync, R: Send>(
     );
     merge(left, right)
 }
+
+/// Treats the items piece by piece.
+pub(crate) fn for_each_piece<T: Send>(items: &mut [T], treat: &(impl Fn(&mut [T]) + Sync)) {
+    if items.len() <= PIECE_SIZE {
+        return treat(items);
+    }
+    let (left, right) = items.split_at_mut(items.len() / 2);
+    join(
+        || for_each_piece(left, treat),
+        || for_each_piece(right, treat),
+    );
+}
+
+/// Fills each result from its job, at the same time where jobs are large. `memory` goes from job
+/// to job; another thread gets memory of its own. A failure of an earlier job hides those of later
+/// ones.
+pub(crate) fn fill_from_jobs<J: Send, T: Send, M: Default + Send, E: Send>(
+    jobs: &mut [Option<J>],
+    results: &mut [T],
+    memory: &mut M,
+    size: &(impl Fn(&J) -> usize + Sync),
+    run: &(impl Fn(J, &mut M) -> Result<T, E> + Sync),
+) -> Result<(), E> {
+    let total: usize = jobs.iter().flatten().map(size).sum();
+    if total < TASK_SIZE || jobs.len() == 1 {
+        for (job, result) in jobs.iter_mut().zip(results) {
+            if let Some(job) = job.take() {
+                *result = run(job, memory)?;
+            }
+        }
+        return Ok(());
+    }
+    let middle = jobs.len() / 2;
+    let (jobs_a, jobs_b) = jobs.split_at_mut(middle);
+    let (results_a, results_b) = results.split_at_mut(middle);
+    let (a, b) = join(
+        || fill_from_jobs(jobs_a, results_a, memory, size, run),
+        || fill_from_jobs(jobs_b, results_b, &mut M::default(), size, run),
+    );
+    a.and(b)
+}

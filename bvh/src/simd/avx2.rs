@@ -305,6 +305,14 @@ pub(super) fn push_eight<const N: usize>(
     }
 }
 
+impl super::build::Halves for F32x8 {
+    #[inline(always)]
+    fn swap_halves(self) -> Self {
+        // SAFETY: AVX2 is available wherever a value of this type exists (file header).
+        Self(unsafe { std::arch::x86_64::_mm256_permute2f128_ps::<1>(self.0, self.0) })
+    }
+}
+
 /// Row m lists the set bits of m from the lowest to the highest, then zeros: the permutation that
 /// closes the gaps of a mask.
 static COMPRESS: [[u32; 8]; 256] = {

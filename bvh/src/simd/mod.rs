@@ -13,6 +13,7 @@
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
+pub(crate) mod build;
 pub(crate) mod dispatch;
 pub(crate) mod isa;
 pub(crate) mod portable;

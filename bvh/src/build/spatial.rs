@@ -1,0 +1,393 @@
+//! Splits that cut primitives: Stich, Friedrich, Dietrich, *Spatial Splits in Bounding Volume
+//! Hierarchies*, 2009, with the bins, budgets and tie rules of Embree 4.
+//!
+//! Every reference has a budget of cuts in the top five bits of its geometry id, larger for larger
+//! boxes. Invariants: a cut covers the primitive's part of the box it came from; references never
+//! exceed the room that the range was given; the result depends on the order of the references,
+//! which only serial code changes, and not on threads.
+
+use glam::Vec3;
+use wide::f32x4;
+
+use super::{
+    LeafReference,
+    binning::Rounding,
+    primitive::{Bounds, PrimitiveRef, RangeBounds},
+    tasks,
+};
+
+/// Bins of spatial splits.
+const BINS: usize = 16;
+
+/// Extents up to this share of the largest coordinate are taken for zero.
+const SMALLEST_EXTENT: f32 = 1.0 / (1 << 16) as f32;
+
+/// A spatial split is tried if the object split's sides overlap in this share of the root's area …
+const ROOT_OVERLAP: f32 = 5e-6;
+/// … and in this share of the range's own area.
+const OVERLAP: f32 = 0.1;
+/// It is taken if it costs less than this share of the object split.
+const GAIN: f32 = 0.99;
+
+/// What cutting needs to know besides the range.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cutting<F> {
+    /// The corners of a primitive.
+    pub(crate) corners: F,
+    /// Surface area of the root box.
+    root_area: f32,
+    /// Whether a cut with an empty side takes away the rest of the reference's budget.
+    empty_side_ends_budget: bool,
+}
+
+/// A plane between spatial bins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SpatialSplit {
+    axis: usize,
+    plane: usize,
+    pub(crate) sah: f32,
+    mapping: Mapping,
+    /// References on both sides together.
+    count: usize,
+}
+
+/// From coordinates to bins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Mapping {
+    offset: f32x4,
+    scale: f32x4,
+    /// Width of a bin; +∞ where the scale is 0.
+    width: f32x4,
+}
+
+impl Mapping {
+    fn new(bounds: &Bounds) -> Self {
+        let (lower, upper) = (bounds.lower().to_array(), bounds.upper().to_array());
+        let scale: [f32; 4] = std::array::from_fn(|axis| {
+            let epsilon = SMALLEST_EXTENT * lower[axis].abs().max(upper[axis].abs());
+            let size = upper[axis] - lower[axis];
+            if axis == 3 || size <= epsilon {
+                0.0
+            } else {
+                BINS as f32 / epsilon.max(size)
+            }
+        });
+        Self {
+            offset: bounds.lower(),
+            scale: f32x4::new(scale),
+            width: f32x4::new(scale.map(f32::recip)),
+        }
+    }
+
+    #[inline(always)]
+    fn bins_of<R: Rounding>(&self, point: f32x4) -> [usize; 3] {
+        let place = (point - self.offset) * self.scale - f32x4::splat(R::SHIFT);
+        let [x, y, z, _] = R::floor(place).to_array();
+        [x, y, z].map(|bin| bin.clamp(0, BINS as i32 - 1) as usize)
+    }
+
+    /// Where bin `plane` begins on an axis.
+    #[inline(always)]
+    fn position(&self, axis: usize, plane: usize) -> f32 {
+        plane as f32 * self.width.to_array()[axis] + self.offset.to_array()[axis]
+    }
+}
+
+#[derive(Clone)]
+struct Bins {
+    bounds: [[Bounds; BINS]; 3],
+    begins: [[u32; BINS]; 3],
+    ends: [[u32; BINS]; 3],
+}
+
+impl Bins {
+    const EMPTY: Self = Self {
+        bounds: [[Bounds::EMPTY; BINS]; 3],
+        begins: [[0; BINS]; 3],
+        ends: [[0; BINS]; 3],
+    };
+
+    fn merge(mut self, other: &Self) -> Self {
+        for axis in 0..3 {
+            for bin in 0..BINS {
+                self.bounds[axis][bin].extend(&other.bounds[axis][bin]);
+                self.begins[axis][bin] += other.begins[axis][bin];
+                self.ends[axis][bin] += other.ends[axis][bin];
+            }
+        }
+        self
+    }
+
+    /// The cheapest plane of an axis: cost, plane, references on both sides.
+    fn best_plane(&self, axis: usize, block_shift: u32) -> (f32, usize, usize) {
+        let blocks = |count: u32| ((count + (1 << block_shift) - 1) >> block_shift) as f32;
+        let mut right = [(0.0, 0); BINS];
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+        for bin in (1..BINS).rev() {
+            bounds.extend(&self.bounds[axis][bin]);
+            count += self.ends[axis][bin];
+            right[bin] = (bounds.half_area() * blocks(count), count);
+        }
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+        let mut best = (f32::INFINITY, 0, 0);
+        for (plane, (right_cost, right_count)) in right.into_iter().enumerate().skip(1) {
+            bounds.extend(&self.bounds[axis][plane - 1]);
+            count += self.begins[axis][plane - 1];
+            let cost = bounds.half_area() * blocks(count) + right_cost;
+            if cost < best.0 {
+                best = (cost, plane, (count + right_count) as usize);
+            }
+        }
+        best
+    }
+}
+
+impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
+    pub(crate) fn new(corners: C, root: &Bounds, empty_side_ends_budget: bool) -> Self {
+        Self {
+            corners,
+            root_area: 2.0 * root.half_area(),
+            empty_side_ends_budget,
+        }
+    }
+
+    /// The cheapest plane that cuts, if it is worth it: the sides of the best object split overlap
+    /// (`overlap`), cutting is cheaper than that split, and there is room for the new references.
+    pub(crate) fn find_split<R: Rounding>(
+        &self,
+        references: &[PrimitiveRef],
+        room: usize,
+        bounds: &RangeBounds,
+        object_sah: f32,
+        overlap: &Bounds,
+        block_shift: u32,
+    ) -> Option<SpatialSplit> {
+        let overlap_area = area(overlap);
+        if !(overlap_area >= ROOT_OVERLAP * self.root_area
+            && overlap_area >= OVERLAP * area(&bounds.geometry))
+        {
+            return None;
+        }
+        let mapping = Mapping::new(&bounds.geometry);
+        let bins = if tasks::in_pieces(references.len()) {
+            tasks::map_merge(
+                references,
+                &|piece| self.fill::<R>(&mapping, piece),
+                &|a: Bins, b| a.merge(&b),
+            )
+        } else {
+            self.fill::<R>(&mapping, references)
+        };
+        let scale = mapping.scale.to_array();
+        let mut best: Option<SpatialSplit> = None;
+        for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
+            let (sah, plane, count) = bins.best_plane(axis, block_shift);
+            if plane != 0 && best.is_none_or(|best| sah < best.sah) {
+                best = Some(SpatialSplit {
+                    axis,
+                    plane,
+                    sah,
+                    mapping,
+                    count,
+                });
+            }
+        }
+        best.filter(|split| {
+            // As in Embree the difference wraps round: a count below that of the range (parts
+            // can be lost to rounding) is no room.
+            split.sah < GAIN * object_sah && split.count.wrapping_sub(references.len()) <= room
+        })
+    }
+
+    fn fill<R: Rounding>(&self, mapping: &Mapping, references: &[PrimitiveRef]) -> Bins {
+        let mut bins = Bins::EMPTY;
+        let scale = mapping.scale.to_array();
+        for reference in references {
+            if reference.budget() <= 1 {
+                let centre = reference.doubled_centroid() * f32x4::splat(0.5);
+                for (axis, bin) in mapping.bins_of::<R>(centre).into_iter().enumerate() {
+                    bins.begins[axis][bin] += 1;
+                    bins.ends[axis][bin] += 1;
+                    bins.bounds[axis][bin].extend(&reference.0);
+                }
+                continue;
+            }
+            let first = mapping.bins_of::<R>(reference.0.lower());
+            let last = mapping.bins_of::<R>(reference.0.upper());
+            let mut corners = None;
+            for axis in 0..3 {
+                if scale[axis] == 0.0 {
+                    continue;
+                }
+                let (first, last) = (first[axis], last[axis]);
+                if first == last {
+                    bins.begins[axis][first] += 1;
+                    bins.ends[axis][last] += 1;
+                    bins.bounds[axis][first].extend(&reference.0);
+                    continue;
+                }
+                let corners = *corners.get_or_insert_with(|| self.corners_of(reference));
+                chop(
+                    &mut bins,
+                    mapping,
+                    axis,
+                    first..=last,
+                    &reference.0,
+                    &corners,
+                );
+            }
+        }
+        bins
+    }
+
+    /// Cuts the references that the plane meets; new ones take the room behind the first `n`.
+    /// Returns how many there are then.
+    pub(crate) fn cut<R: Rounding>(
+        &self,
+        references: &mut [PrimitiveRef],
+        n: usize,
+        split: &SpatialSplit,
+    ) -> usize {
+        let position = split.mapping.position(split.axis, split.plane);
+        let mut count = n;
+        for index in 0..n {
+            let reference = references[index];
+            let budget = reference.budget();
+            if budget <= 1 {
+                continue;
+            }
+            let first = split.mapping.bins_of::<R>(reference.0.lower())[split.axis];
+            let last = split.mapping.bins_of::<R>(reference.0.upper())[split.axis];
+            if !(first < split.plane && split.plane <= last) {
+                continue;
+            }
+            let corners = self.corners_of(&reference);
+            let [left, right] = clip(&corners, split.axis, position, &reference.0);
+            if left.is_empty() || right.is_empty() {
+                if self.empty_side_ends_budget {
+                    references[index] = reference.with_budget(0);
+                }
+            } else if count == references.len() {
+                references[index] = reference.with_budget(0);
+                break;
+            } else {
+                references[index] = reference.part(&left, budget - 1);
+                references[count] = reference.part(&right, budget - 1);
+                count += 1;
+            }
+        }
+        count
+    }
+
+    fn corners_of(&self, reference: &PrimitiveRef) -> [f32x4; 3] {
+        (self.corners)(reference.cut_leaf_reference()).map(|v| f32x4::new([v.x, v.y, v.z, 0.0]))
+    }
+}
+
+impl SpatialSplit {
+    /// Whether a reference lies on the left side.
+    #[inline(always)]
+    pub(crate) fn is_left<R: Rounding>(&self, reference: &PrimitiveRef) -> bool {
+        let centre = reference.doubled_centroid() * f32x4::splat(0.5);
+        self.mapping.bins_of::<R>(centre)[self.axis] < self.plane
+    }
+}
+
+/// Adds a primitive that spans several bins of an axis, part by part.
+fn chop(
+    bins: &mut Bins,
+    mapping: &Mapping,
+    axis: usize,
+    span: std::ops::RangeInclusive<usize>,
+    bounds: &Bounds,
+    corners: &[f32x4; 3],
+) {
+    let (mut first, mut last) = span.into_inner();
+    let (mut begin, mut end) = (first, last);
+    // The bins were found by one rounding, the planes have another.
+    while first < last && mapping.position(axis, first + 1) <= bounds.lower().to_array()[axis] {
+        first += 1;
+    }
+    while first < last && mapping.position(axis, last) >= bounds.upper().to_array()[axis] {
+        last -= 1;
+    }
+    let mut rest = *bounds;
+    for bin in first..last {
+        let [left, right] = clip(corners, axis, mapping.position(axis, bin + 1), &rest);
+        if left.is_empty() {
+            begin += 1;
+        }
+        bins.bounds[axis][bin].extend(&left);
+        rest = right;
+    }
+    if rest.is_empty() {
+        end -= 1;
+    }
+    bins.begins[axis][begin] += 1;
+    bins.ends[axis][end] += 1;
+    bins.bounds[axis][last].extend(&rest);
+}
+
+/// The boxes of the two parts of a triangle on both sides of a plane, within `bounds`.
+#[inline(always)]
+fn clip(corners: &[f32x4; 3], axis: usize, position: f32, bounds: &Bounds) -> [Bounds; 2] {
+    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
+    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+        let (from, to) = (corners[from], corners[to]);
+        let (a, b) = (from.to_array()[axis], to.to_array()[axis]);
+        if a <= position {
+            left.extend_by_point(from);
+        }
+        if a >= position {
+            right.extend_by_point(from);
+        }
+        if (a < position && position < b) || (b < position && position < a) {
+            let t = (position - a) * (1.0 / (b - a));
+            let crossing = f32x4::splat(t) * (to - from) + from;
+            left.extend_by_point(crossing);
+            right.extend_by_point(crossing);
+        }
+    }
+    [left.intersection(bounds), right.intersection(bounds)]
+}
+
+/// Surface area; 0 of an empty box.
+fn area(bounds: &Bounds) -> f32 {
+    if bounds.is_empty() {
+        0.0
+    } else {
+        2.0 * bounds.half_area()
+    }
+}
+
+/// Gives every reference its budget of cuts, by its share of the summed area of all boxes.
+pub(crate) fn give_budgets(references: &mut [PrimitiveRef]) {
+    let n = references.len() as f32;
+    let area = |reference: &PrimitiveRef| 2.0 * reference.0.half_area();
+    let total: f64 = references.iter().map(|r| f64::from(area(r))).sum();
+    let per_total = 1.0 / total as f32;
+    for reference in references {
+        let share = (10.0 * n * area(reference) * per_total).ceil();
+        // NaN (no area at all) is treated as the least share.
+        let cuts = if share >= 1.0 {
+            (share as u32).min(27)
+        } else {
+            1
+        };
+        *reference = reference.with_budget(4 + cuts);
+    }
+}
+
+/// The room for new references that the left of two sides gets: its share of the budgets.
+pub(crate) fn room_of_left(left: &[PrimitiveRef], right: &[PrimitiveRef], room: usize) -> usize {
+    let sum = |references: &[PrimitiveRef]| -> u64 {
+        references.iter().map(|r| u64::from(r.budget())).sum()
+    };
+    let (left, right) = (sum(left), sum(right));
+    let share = left as f32 / (left + right) as f32 * room as f32;
+    if share.is_nan() {
+        room
+    } else {
+        (share as usize).min(room)
+    }
+}

@@ -1,0 +1,35 @@
+//! Subcommands, one file each.
+
+mod table;
+mod trees;
+
+use clap::{Parser, Subcommand};
+
+/// Compares raywright with oracles.
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+#[command(after_help = "Exit codes: 0 all equal, 1 something differs, 2 bad input or usage.")]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Compare our trees with those of Embree's rtcBuildBVH, to the last bit
+    Trees(trees::TreesArgs),
+}
+
+/// What a comparison found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    AllEqual,
+    SomethingDiffers,
+}
+
+/// Runs a command.
+pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
+    match cli.command {
+        Command::Trees(args) => trees::run(&args),
+    }
+}
