@@ -5,7 +5,11 @@ use glam::Vec3;
 use crate::{
     any_tree::AnyTree,
     bounds::Aabb,
-    build::{self, BuildWorkspace, LeafReference, primitive::PrimitiveRef},
+    build::{
+        self, BuildWorkspace, LeafReference,
+        primitive::{Bounds, PrimitiveRef},
+        tasks,
+    },
     error::BuildError,
     layout::{emit::Source, triangles::Triangles},
     mesh::{MeshError, TriangleMesh},
@@ -61,17 +65,13 @@ impl Bvh {
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
         let first_ids = first_ids(meshes)?;
-        let bounds = bounds_of(meshes);
+        let bounds = reference_all(meshes, &mut workspace.references);
         let scale = scale_of(&bounds)?;
-        workspace.references.clear();
-        for (geometry_id, mesh) in meshes.iter().enumerate() {
-            workspace
-                .references
-                .extend((0..mesh.triangles().len() as u32).map(|primitive_id| {
-                    let bounds = corners_bounds(mesh.corners(primitive_id).map(|v| v * scale));
-                    PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
-                }));
-        }
+        tasks::for_each_piece(&mut workspace.references, &|piece| {
+            for reference in piece {
+                *reference = scaled(reference, scale);
+            }
+        });
         let corners = |leaf: LeafReference| {
             meshes[leaf.geometry_id as usize]
                 .corners(leaf.primitive_id)
@@ -237,6 +237,58 @@ fn locate(first_ids: &[u32], id: u32) -> (u32, u32) {
     // The last mesh that begins at or before it: empty meshes begin where the next one does.
     let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
     (geometry_id as u32, id - first_ids[geometry_id])
+}
+
+/// Fills in the box of each triangle in the caller's coordinates; gives the box around them.
+fn reference_all(meshes: &[&TriangleMesh], references: &mut Vec<PrimitiveRef>) -> Aabb {
+    let count = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+    // What an earlier build left is overwritten like what is new.
+    references.resize(count, PrimitiveRef::new(Aabb::EMPTY, 0, 0));
+    let (mut bounds, mut rest) = (Bounds::EMPTY, &mut references[..]);
+    for (geometry_id, mesh) in meshes.iter().enumerate() {
+        let (own, others) = rest.split_at_mut(mesh.triangles().len());
+        rest = others;
+        bounds.extend(&reference_mesh(mesh, geometry_id as u32, 0, own));
+    }
+    bounds.to_aabb()
+}
+
+/// The same for the triangles of a mesh from `first` on, at the same time where they are many.
+fn reference_mesh(
+    mesh: &TriangleMesh,
+    geometry_id: u32,
+    first: u32,
+    references: &mut [PrimitiveRef],
+) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    if references.len() > tasks::PIECE_SIZE {
+        let middle = references.len() / 2;
+        let (left, right) = references.split_at_mut(middle);
+        let (left, right) = tasks::join(
+            || reference_mesh(mesh, geometry_id, first, left),
+            || reference_mesh(mesh, geometry_id, first + middle as u32, right),
+        );
+        bounds.extend(&left);
+        bounds.extend(&right);
+        return bounds;
+    }
+    for (primitive_id, reference) in (first..).zip(references) {
+        let own = corners_bounds(mesh.corners(primitive_id));
+        *reference = PrimitiveRef::new(own, geometry_id, primitive_id);
+        bounds.extend(&reference.0);
+    }
+    bounds
+}
+
+/// A box times a power of two: the box of the scaled corners to the last bit, since rounding keeps
+/// order.
+fn scaled(reference: &PrimitiveRef, scale: f32) -> PrimitiveRef {
+    let Aabb { min, max } = reference.0.to_aabb();
+    let bounds = Aabb {
+        min: min * scale,
+        max: max * scale,
+    };
+    PrimitiveRef::new(bounds, reference.geometry_id(), reference.primitive_id())
 }
 
 pub(crate) fn bounds_of(meshes: &[&TriangleMesh]) -> Aabb {
