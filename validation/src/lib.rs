@@ -7,6 +7,7 @@
 //! | [`exact`] | where does a ray hit a triangle? | f64 |
 //! | [`golden`] | is a tree Embree's, to the last bit? | hashes of Embree's trees, in files |
 //! | [`embree`] | the same, for any input and parameters | the library itself, if it is there |
+//! | [`random`] | the same, over many | random triangles and parameters |
 //!
 //! The program of this crate asks the last two questions; see its `--help`:
 //!
@@ -16,7 +17,7 @@
 //! ```
 //!
 //! Features: `golden` (the files), `embree` (the library, loaded at run time), `cli` (the program,
-//! with `golden`). The defaults are `cli` and `embree`.
+//! with both; the default).
 #![deny(unsafe_code)]
 
 #[cfg(feature = "embree")]
@@ -24,8 +25,12 @@ pub mod embree;
 pub mod exact;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(all(feature = "embree", feature = "golden"))]
+pub mod random;
 pub mod tree;
+mod triangles;
 pub mod z_test;
 
 pub use tree::{Node, Tree};
+pub use triangles::TriangleSet;
 pub use z_test::{Estimate, ZTest};

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use raywright_bvh::{BuildParams, Bvh, Ray, TriangleMesh, Vec3};
 use raywright_validation::{
-    Tree,
+    Tree, TriangleSet,
     embree::{BuildArguments, BuildQuality, Device, Embree, EmbreeError, SceneSettings},
-    golden::{self, TriangleSet},
+    golden::{self, Outcome},
+    random::RandomBuild,
 };
 
 /// A device; says so if there is no library.
@@ -134,4 +135,21 @@ fn hits_are_ours() {
 fn a_library_that_is_not_there_is_an_error() {
     let error = Embree::load(Path::new("no-such-library")).expect_err("no library");
     assert!(matches!(error, EmbreeError::NotEmbree { .. }), "{error}");
+}
+
+/// Thousands more: `cargo run --release -p raywright-validation -- trees --random`.
+#[test]
+fn random_builds_are_equal() {
+    let Some(device) = device() else { return };
+    let mut workspace = Default::default();
+    let mut equal = 0;
+    for seed in 0..200 {
+        let build = RandomBuild::new(seed, &[]);
+        match build.compare(&device, &mut workspace) {
+            (Outcome::Equal, _) => equal += 1,
+            (Outcome::Skipped(why), _) => eprintln!("skipped: seed {seed}: {why}"),
+            (outcome, details) => panic!("{build}\n{outcome:?} {details:?}"),
+        }
+    }
+    assert!(equal > 150, "{equal} were compared");
 }
