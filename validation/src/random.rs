@@ -7,6 +7,8 @@
 //!
 //! Not asked, because Embree crashes: Morton order with more than 8 children. Not compared, because
 //! Embree's tree then depends on its thread library: Morton order with some thousand equal codes.
+//! Spatial splits of more than 3072 triangles can depend on the cores that the process may use:
+//! keep to one of them, as the program of this crate does.
 
 use std::{collections::HashMap, fmt};
 
