@@ -6,21 +6,31 @@
 //! | [`z_test`] | do two pictures have the same mean? | statistics |
 //! | [`exact`] | where does a ray hit a triangle? | f64 |
 //! | [`golden`] | is a tree Embree's, to the last bit? | hashes of Embree's trees, in files |
+//! | [`embree`] | the same, for any input and parameters | the library itself, if it is there |
+//! | [`random`] | the same, over many | random triangles and parameters |
 //!
-//! The program of this crate asks the last question; see its `--help`:
+//! The program of this crate asks the last two questions; see its `--help`:
 //!
 //! ```text
 //! cargo run --release -p raywright-validation -- trees            # all golden lines
+//! cargo run --release -p raywright-validation -- trees --random   # random builds beside Embree
 //! ```
 //!
-//! Features: `golden` (the files), `cli` (the program, with `golden`). The default is `cli`.
-#![forbid(unsafe_code)]
+//! Features: `golden` (the files), `embree` (the library, loaded at run time), `cli` (the program,
+//! with both; the default).
+#![deny(unsafe_code)]
 
+#[cfg(feature = "embree")]
+pub mod embree;
 pub mod exact;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(all(feature = "embree", feature = "golden"))]
+pub mod random;
 pub mod tree;
+mod triangles;
 pub mod z_test;
 
 pub use tree::{Node, Tree};
+pub use triangles::TriangleSet;
 pub use z_test::{Estimate, ZTest};

@@ -3,8 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use raywright_validation::golden::{
-    self, DebugTree, Fnv, GoldenQuality, Line, Outcome, Steps, TriangleSet, procedural, read_lines,
+use raywright_validation::{
+    TriangleSet,
+    golden::{self, DebugTree, Fnv, GoldenQuality, Line, Outcome, Steps, procedural, read_lines},
 };
 
 /// The golden files beside the checkout; says so if there are none.

@@ -1,5 +1,6 @@
 //! Subcommands, one file each.
 
+mod random;
 mod table;
 mod trees;
 

@@ -9,10 +9,9 @@ use std::{
 use clap::{Args, ValueEnum};
 use raywright_bvh::{BuildParams, BuildWorkspace};
 use raywright_validation::{
-    Tree,
+    Tree, TriangleSet,
     golden::{
-        self, DebugTree, Figures, Fnv, GoldenQuality, Line, Outcome, SceneLevel, Steps,
-        TriangleSet, read_lines,
+        self, DebugTree, Figures, Fnv, GoldenQuality, Line, Outcome, SceneLevel, Steps, read_lines,
     },
 };
 
@@ -31,7 +30,11 @@ Scenes are read from DIR/scenes.
 A line is equal if its tree has the hash of Embree's tree, with the order of children and leaves.
 'only order' has the same tree in another order. 'equal refs' are lines whose tree depends on
 Embree's thread library: only the number of references is compared. Lines that need the reciprocal
-estimate of the golden machine (an AMD Zen 4) are skipped on processors with another.")]
+estimate of the golden machine (an AMD Zen 4) are skipped on processors with another.
+
+Random builds need Embree (version 4 for full parity): RAYWRIGHT_EMBREE names a library file or a
+folder with one; else the system's libraries and target/embree of the workspace are tried, which
+tools/fetch-embree fills. Without one the command says so and has compared nothing.")]
 pub(crate) struct TreesArgs {
     /// The folder with golden/trees and scenes (default: ../shared/data beside the checkout)
     #[arg(long, value_name = "DIR")]
@@ -42,6 +45,12 @@ pub(crate) struct TreesArgs {
     /// Only this quality; may be given more than once
     #[arg(long = "quality", value_name = "QUALITY")]
     qualities: Vec<QualityArg>,
+    /// In place of the golden lines, N random builds beside an Embree library
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "2000", conflicts_with_all = ["sets", "qualities"])]
+    random: Option<u64>,
+    /// The seed of the first random build; each further build has the next seed
+    #[arg(long, value_name = "S", default_value_t = 1, requires = "random")]
+    seed: u64,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -64,6 +73,9 @@ impl From<QualityArg> for GoldenQuality {
 /// Compares all files; says on standard output what came of it.
 pub(crate) fn run(args: &TreesArgs) -> Result<Verdict, Box<dyn Error>> {
     let data = args.data.clone().unwrap_or_else(default_data);
+    if let Some(builds) = args.random {
+        return super::random::run(builds, args.seed, &data.join("scenes"));
+    }
     let run = Run {
         folder: data.join("golden/trees"),
         scenes: data.join("scenes"),
@@ -85,7 +97,7 @@ pub(crate) fn run(args: &TreesArgs) -> Result<Verdict, Box<dyn Error>> {
 
 /// Beside the workspace: Cargo names this crate's folder to programs that it runs; otherwise the
 /// current folder is taken for the workspace.
-pub(super) fn default_data() -> PathBuf {
+fn default_data() -> PathBuf {
     let workspace = env::var_os("CARGO_MANIFEST_DIR")
         .map(PathBuf::from)
         .and_then(|member| member.parent().map(Path::to_path_buf))

@@ -2,8 +2,8 @@
 
 use raywright_bvh::{BuildParams, BuildPrimitive, BuildWorkspace, Hierarchy, Quality, Rounding};
 
-use super::{Expected, Figures, GoldenQuality, Line, TriangleSet, has_golden_reciprocal};
-use crate::tree::Tree;
+use super::{Expected, Figures, GoldenQuality, Line, has_golden_reciprocal};
+use crate::{tree::Tree, triangles::TriangleSet};
 
 /// What came of a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,8 @@ pub fn parameters(line: &Line) -> Result<BuildParams, String> {
 
 /// A budget per primitive whose product with `n`, rounded down, is `capacity`: the middle of such
 /// budgets, or the least where the middle is more than the 8 that are allowed.
-fn split_budget(capacity: usize, n: usize) -> Option<f32> {
+#[must_use]
+pub fn split_budget(capacity: usize, n: usize) -> Option<f32> {
     let middle = ((capacity as f64 + 0.5) / n as f64) as f32;
     let least = (capacity as f64 / n as f64) as f32;
     [middle, least]

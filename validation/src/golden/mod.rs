@@ -22,7 +22,7 @@ mod sets;
 
 use std::path::PathBuf;
 
-pub use compare::{Outcome, build, compare, parameters};
+pub use compare::{Outcome, build, compare, parameters, split_budget};
 pub use figures::Figures;
 pub use hash::{Fnv, ordered, unordered};
 pub use lines::{
@@ -31,7 +31,8 @@ pub use lines::{
 pub use obj::read_obj;
 pub use reciprocal::has_golden_reciprocal;
 pub use scene_level::{compare_scene_level, scene_level_parameters};
-pub use sets::{NAMES, TriangleSet, procedural};
+pub(crate) use sets::families;
+pub use sets::{NAMES, procedural};
 
 /// Why golden files or scenes could not be read.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,8 @@ use std::{fs, io::Read, path::Path};
 
 use raywright_bvh::Vec3;
 
-use super::{GoldenError, TriangleSet};
+use super::GoldenError;
+use crate::triangles::TriangleSet;
 
 /// The triangles of an OBJ file, gzipped if its name ends in `.gz`. Its name is that of the file
 /// without endings.

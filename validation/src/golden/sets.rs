@@ -4,56 +4,9 @@
 //! Source: section 3 of the README beside the golden files. Invariant: the hash of the vertices is
 //! that of `debug_steps.jsonl` (test of this crate).
 
-use raywright_bvh::{Aabb, BuildPrimitive, LeafReference, Vec3};
+use raywright_bvh::Vec3;
 
-/// Triangles to build over. The primitive id is the place in the list, the geometry id that place
-/// modulo the number of geometries.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TriangleSet {
-    /// Its name in the golden files.
-    pub name: String,
-    /// The corners of each triangle, in any unit.
-    pub triangles: Vec<[Vec3; 3]>,
-    /// How many geometries the triangles are dealt to.
-    pub geometries: u32,
-}
-
-impl TriangleSet {
-    /// The box and ids of each triangle.
-    #[must_use]
-    pub fn primitives(&self) -> Vec<BuildPrimitive> {
-        self.triangles
-            .iter()
-            .zip(0..)
-            .map(|(corners, i)| BuildPrimitive {
-                bounds: bounds(corners),
-                geometry_id: i % self.geometries,
-                primitive_id: i,
-            })
-            .collect()
-    }
-
-    /// The corners of a primitive, as the builder asks for them.
-    #[must_use]
-    pub fn corners(&self, reference: LeafReference) -> [Vec3; 3] {
-        self.triangles[reference.primitive_id as usize]
-    }
-
-    /// The box of all triangles.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        self.triangles
-            .iter()
-            .fold(Aabb::EMPTY, |all, corners| all.union(bounds(corners)))
-    }
-}
-
-fn bounds([a, b, c]: &[Vec3; 3]) -> Aabb {
-    Aabb {
-        min: a.min(*b).min(*c),
-        max: a.max(*b).max(*c),
-    }
-}
+use crate::triangles::TriangleSet;
 
 /// The procedural sets, in the order of `sets.jsonl`.
 pub const NAMES: [&str; 17] = [
@@ -216,6 +169,68 @@ fn mixed(seed: u32, n: usize) -> Vec<[Vec3; 3]> {
         lcg.around(p, w, w / 2)
     };
     (0..n).map(triangle).collect()
+}
+
+/// Families of triangles with any number of them: the sets above, and what real scenes have beside
+/// (whole coordinates, duplicates, triangles without area).
+pub(crate) mod families {
+    use super::*;
+
+    /// A family: its name, and its triangles by seed and number.
+    pub(crate) type Family = (&'static str, fn(u32, usize) -> Vec<[Vec3; 3]>);
+
+    pub(crate) const FAMILIES: [Family; 9] = [
+        ("uniform", |seed, n| uniform(seed, n, 2048)),
+        ("clustered", clustered),
+        ("diagonals", diagonals),
+        ("flat", flat),
+        ("points", points),
+        ("mixed", mixed),
+        ("whole numbers", lattice),
+        ("duplicates", duplicates),
+        ("far away", |seed, n| {
+            let triangles = uniform(seed, n, 2048).into_iter();
+            triangles
+                .map(|corners| corners.map(|v| v * 0.1 + Vec3::new(100.0, -7.0, 0.3)))
+                .collect()
+        }),
+    ];
+
+    /// Right triangles in planes of whole coordinates: half faces of the cells of a grid of 24³.
+    fn lattice(seed: u32, n: usize) -> Vec<[Vec3; 3]> {
+        let mut lcg = Lcg(seed);
+        let triangle = |_| {
+            let p = lcg.below3(24).map(|c| c as f32);
+            let axis = lcg.below(3) as usize;
+            let corner = |steps: [f32; 2]| {
+                let mut v = p;
+                v[(axis + 1) % 3] += steps[0];
+                v[(axis + 2) % 3] += steps[1];
+                Vec3::from_array(v)
+            };
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]].map(corner)
+        };
+        (0..n).map(triangle).collect()
+    }
+
+    /// Runs of equal triangles; of the different ones one in four is a line and one in eight a
+    /// point.
+    fn duplicates(seed: u32, n: usize) -> Vec<[Vec3; 3]> {
+        let mut lcg = Lcg(seed);
+        let mut triangles = Vec::with_capacity(n);
+        while triangles.len() < n {
+            let p = lcg.below3(65536);
+            let [a, b, c] = lcg.around(p, 8192, 4096);
+            let corners = match lcg.below(8) {
+                0 | 1 => [a, b, b],
+                2 => [a; 3],
+                _ => [a, b, c],
+            };
+            let run = 1 + lcg.below(12) as usize;
+            triangles.extend(std::iter::repeat_n(corners, run.min(n - triangles.len())));
+        }
+        triangles
+    }
 }
 
 #[cfg(test)]
