@@ -4,6 +4,7 @@
 //! Run: `cargo bench -p raywright-benches --bench rays [--features peers]`
 
 use raywright_benches::{
+    goals::Goals,
     rays::{RaySet, ray_sets},
     turns::measure,
 };
@@ -125,34 +126,6 @@ fn table(scene: &str, set: &RaySet, engines: &[Engine], tree: &Bvh, goals: &mut 
             set.name
         );
         goals.check(what, turns.speed[1].median <= 1.03);
-    }
-}
-
-#[derive(Default)]
-struct Goals {
-    met: usize,
-    missed: Vec<String>,
-}
-
-impl Goals {
-    fn check(&mut self, what: String, met: bool) {
-        if met {
-            self.met += 1
-        } else {
-            self.missed.push(what)
-        }
-    }
-
-    fn print(&self) {
-        println!();
-        for missed in &self.missed {
-            println!("missed: {missed}");
-        }
-        println!(
-            "goals: {} of {} met",
-            self.met,
-            self.met + self.missed.len()
-        );
     }
 }
 
