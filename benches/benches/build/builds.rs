@@ -12,7 +12,10 @@ use raywright_bvh::{
     Aabb, BuildParams, BuildPrimitive, BuildWorkspace, Bvh, Hierarchy, LeafReference, Quality,
     Rounding, TriangleMesh,
 };
-use raywright_validation::embree::{BuildArguments, BuildQuality, Device, SceneSettings};
+use raywright_validation::{
+    Node, Tree,
+    embree::{BuildArguments, BuildQuality, Device, SceneSettings},
+};
 
 const ROUNDS: usize = 5;
 
@@ -22,6 +25,9 @@ const GOALS: [(Quality, BuildQuality, f64); 3] = [
     (Quality::BinnedSah, BuildQuality::Medium, 1.0),
     (Quality::SpatialSplits, BuildQuality::High, 0.8),
 ];
+
+/// The largest ratio of costs that is no worse: rounding alone changes it by less than this.
+const SAH_GOAL: f64 = 1.001;
 
 /// Qualities that Embree does not have, and the quality that they are set beside.
 const BEYOND: [(Quality, BuildQuality); 2] = [
@@ -73,9 +79,30 @@ fn embree_params(quality: BuildQuality) -> BuildParams {
 }
 
 /// Expected visits of nodes and of blocks of four, in Embree's units; `None` if it is not built.
+/// For Embree's settings this is the cost of Embree's own tree, which is ours (golden tests).
 fn sah(mesh: &TriangleMesh, params: &BuildParams) -> Option<f64> {
     let stats = Bvh::build(&[mesh], params).ok()?.stats();
     Some(stats.sah_nodes + stats.sah_blocks)
+}
+
+/// The same for a tree of either builder over primitives in the box `root`.
+fn sah_of(tree: &Tree, root: &Aabb) -> f64 {
+    fn sum(node: &Node, bounds: &Aabb) -> f64 {
+        match node {
+            Node::Leaf(references) => half_area(bounds) * references.len().div_ceil(4) as f64,
+            Node::Inner(children) => {
+                let below = children.iter().map(|(bounds, child)| sum(child, bounds));
+                half_area(bounds) + below.sum::<f64>()
+            }
+        }
+    }
+    let root_node = tree.root.as_ref().expect("a tree over something");
+    sum(root_node, root) / half_area(root)
+}
+
+fn half_area(bounds: &Aabb) -> f64 {
+    let d = bounds.max.as_dvec3() - bounds.min.as_dvec3();
+    d.x * (d.y + d.z) + d.y * d.z
 }
 
 impl Summary {
@@ -95,20 +122,25 @@ impl Summary {
             }
             let ours = builders.len();
             builders.extend(our_builds(mesh, params_of(quality), clock));
+            let api = builders.len();
             if let Some(device) = device {
                 builders.extend(api_builds(device, mesh, &primitives, embree_quality, clock));
             }
             let times = table(&format!("{quality:?}"), &builders, clock);
-            let (Some(time), Some(own), Some(theirs)) =
-                (times.get(ours), builders[ours].sah, builders[0].sah)
-            else {
+            if device.is_none() || threads != 1 || api == ours {
                 continue;
+            }
+            // Embree's builder interface spoils its spatial splits (it clears budgets); its scenes
+            // do not, and are what ours has to reach.
+            let theirs = match embree_quality {
+                BuildQuality::High => builders[0].sah,
+                BuildQuality::Low | BuildQuality::Medium => builders[api].sah,
             };
-            if device.is_some() && threads == 1 {
+            if let (Some(own), Some(theirs)) = (builders[ours].sah, theirs) {
                 self.rows.push(Row {
                     scene: scene.name.clone(),
                     quality,
-                    time: *time,
+                    time: times[ours],
                     sah: own / theirs,
                 });
             }
@@ -150,9 +182,8 @@ impl Summary {
             let what =
                 format!("{quality:?}: build in {mean:.3} of Embree's CPU time, goal {limit}");
             goals.check(what, mean <= limit);
-            let what = format!("{quality:?}: SAH up to {worst:.4} of Embree's, goal 1");
-            // Four digits, as both are printed.
-            goals.check(what, worst > 0.0 && worst <= 1.00005);
+            let what = format!("{quality:?}: SAH up to {worst:.4} of Embree's, goal {SAH_GOAL}");
+            goals.check(what, worst > 0.0 && worst <= SAH_GOAL);
         }
     }
 }
@@ -211,31 +242,30 @@ fn api_builds<'a>(
     let params = embree_params(quality);
     let arguments = BuildArguments::of(&params, primitives.len()).expect("a quality of Embree's");
     let corners = |reference: LeafReference| mesh.corners(reference.primitive_id);
+    let root = primitives
+        .iter()
+        .fold(Aabb::EMPTY, |all, p| all.union(p.bounds));
+    let embree = move || {
+        let built = device.build(primitives, Some(&corners), &arguments);
+        built.expect("a tree")
+    };
     let ours = [Rounding::Exact, Rounding::Embree].map(|rounding| {
         let mut params = params;
         params.rounding = rounding;
+        let build = move || {
+            let workspace = &mut BuildWorkspace::default();
+            Hierarchy::build(primitives, Some(&corners), &params, workspace).expect("a tree")
+        };
         Builder {
             name: format!("raywright Hierarchy::build, {rounding:?}"),
-            sah: None,
-            run: Box::new(move || {
-                clock.time(|| {
-                    let workspace = &mut BuildWorkspace::default();
-                    Hierarchy::build(primitives, Some(&corners), &params, workspace)
-                        .expect("a tree")
-                })
-            }),
+            sah: Some(sah_of(&Tree::of(&build()), &root)),
+            run: Box::new(move || clock.time(build)),
         }
     });
     let embree = Builder {
         name: "Embree rtcBuildBVH".into(),
-        sah: None,
-        run: Box::new(move || {
-            clock.time(|| {
-                device
-                    .build(primitives, Some(&corners), &arguments)
-                    .expect("a tree")
-            })
-        }),
+        sah: Some(sah_of(&embree().tree().expect("a whole tree"), &root)),
+        run: Box::new(move || clock.time(embree)),
     };
     std::iter::once(embree).chain(ours).collect()
 }
@@ -279,6 +309,8 @@ fn table(title: &str, builders: &[Builder<'_>], clock: Clock) -> Vec<f64> {
                 .map_or_else(String::new, |sah| format!("{sah:.3}"))
         );
     }
-    println!("  SAH of Embree: that of our tree by its settings, which is its tree (golden tests)");
+    println!(
+        "  SAH of rtcCommitScene: of our tree by its settings, which is its tree (golden tests)"
+    );
     medians
 }
