@@ -3,14 +3,19 @@
 use glam::Vec3;
 
 use crate::{
+    any_tree::AnyTree,
     bounds::Aabb,
-    build::{self, BuildWorkspace, LeafReference, primitive::PrimitiveRef},
+    build::{
+        self, BuildWorkspace, LeafReference,
+        primitive::{Bounds, PrimitiveRef},
+        tasks,
+    },
     error::BuildError,
-    layout::{emit, tree::Tree},
+    layout::{emit::Source, triangles::Triangles},
     mesh::{MeshError, TriangleMesh},
     params::BuildParams,
     ray::{Hit, Ray, Work},
-    simd::{Isa, dispatch},
+    simd::Isa,
     stats::TreeStats,
     traverse::kernel::{Candidate, Count, RaySetup, power_of_two_below},
 };
@@ -21,9 +26,9 @@ const COORDINATE_MAX: f32 = (1u128 << 100) as f32;
 
 /// A bounding volume hierarchy over triangles.
 ///
-/// Which triangle a ray hits, and where, is a function of the ray and the meshes alone: no
-/// parameter of the build, no instruction set and no number of threads changes a bit of it. Equal
-/// distances are decided by the lowest geometry id, then by the lowest primitive id.
+/// Which triangle a ray hits, and where, is a function of the ray, the meshes and
+/// [`Accuracy`](crate::Accuracy) alone: no other parameter of the build, no instruction set and no
+/// number of threads changes a bit of it. Equal distances are decided by the lowest geometry id, then by the lowest primitive id.
 #[derive(Clone, Debug)]
 pub struct Bvh {
     tree: AnyTree,
@@ -35,13 +40,6 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
-}
-
-#[derive(Clone, Debug)]
-enum AnyTree {
-    Two(Tree<2, 2>),
-    Four(Tree<4, 2>),
-    Eight(Tree<8, 8>),
 }
 
 impl Bvh {
@@ -67,37 +65,31 @@ impl Bvh {
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
         let first_ids = first_ids(meshes)?;
-        let bounds = bounds_of(meshes);
+        let bounds = reference_all(meshes, &mut workspace.references);
         let scale = scale_of(&bounds)?;
-        workspace.references.clear();
-        for (geometry_id, mesh) in meshes.iter().enumerate() {
-            workspace
-                .references
-                .extend((0..mesh.triangles().len() as u32).map(|primitive_id| {
-                    let bounds = corners_bounds(mesh.corners(primitive_id).map(|v| v * scale));
-                    PrimitiveRef::new(bounds, geometry_id as u32, primitive_id)
-                }));
-        }
+        tasks::for_each_piece(&mut workspace.references, &|piece| {
+            for reference in piece {
+                *reference = scaled(reference, scale);
+            }
+        });
         let corners = |leaf: LeafReference| {
             meshes[leaf.geometry_id as usize]
                 .corners(leaf.primitive_id)
                 .map(|v| v * scale)
         };
         let root = build::build(workspace, Some(corners), params)?;
-        let source = emit::Source {
+        let source = Source {
+            root,
             records: &workspace.records,
             leaves: &workspace.leaves,
-            triangle: |leaf: LeafReference| {
-                let id = first_ids[leaf.geometry_id as usize] + leaf.primitive_id;
-                (id, corners(leaf))
+            triangles: Triangles {
+                meshes,
+                first_ids: &first_ids,
+                first_points: &first_points(meshes)?,
+                scale,
             },
         };
-        let mut tree = AnyTree::new(params.branching_factor);
-        match &mut tree {
-            AnyTree::Two(tree) => emit::emit(tree, root.as_ref(), &source),
-            AnyTree::Four(tree) => emit::emit(tree, root.as_ref(), &source),
-            AnyTree::Eight(tree) => emit::emit(tree, root.as_ref(), &source),
-        }
+        let tree = AnyTree::new(&source, params)?;
         if params.dynamics == crate::Dynamics::Static {
             *workspace = BuildWorkspace::default();
         }
@@ -166,21 +158,13 @@ impl Bvh {
     /// Counts, depth, cost and bytes, found by walking through the tree.
     #[must_use]
     pub fn stats(&self) -> TreeStats {
-        match &self.tree {
-            AnyTree::Two(tree) => TreeStats::of(tree, &self.params),
-            AnyTree::Four(tree) => TreeStats::of(tree, &self.params),
-            AnyTree::Eight(tree) => TreeStats::of(tree, &self.params),
-        }
+        self.tree.stats(&self.params)
     }
 
     #[inline]
     fn closest_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> Option<Hit> {
         let setup = RaySetup::new(ray, self.scale)?;
-        let candidate = match &self.tree {
-            AnyTree::Two(tree) => dispatch::closest(self.isa, tree, &setup, count),
-            AnyTree::Four(tree) => dispatch::closest(self.isa, tree, &setup, count),
-            AnyTree::Eight(tree) => dispatch::closest(self.isa, tree, &setup, count),
-        }?;
+        let candidate = self.tree.closest(self.isa, &setup, count)?;
         Some(hit_of(&candidate, &setup, &self.first_ids))
     }
 
@@ -189,22 +173,7 @@ impl Bvh {
         let Some(setup) = RaySetup::new(ray, self.scale) else {
             return false;
         };
-        match &self.tree {
-            AnyTree::Two(tree) => dispatch::any(self.isa, tree, &setup, count),
-            AnyTree::Four(tree) => dispatch::any(self.isa, tree, &setup, count),
-            AnyTree::Eight(tree) => dispatch::any(self.isa, tree, &setup, count),
-        }
-    }
-}
-
-impl AnyTree {
-    /// An empty tree of a branching factor that has been validated.
-    fn new(branching_factor: u32) -> Self {
-        match branching_factor {
-            ..=2 => Self::Two(Tree::default()),
-            3..=4 => Self::Four(Tree::default()),
-            _ => Self::Eight(Tree::default()),
-        }
+        self.tree.any(self.isa, &setup, count)
     }
 }
 
@@ -213,7 +182,8 @@ impl AnyTree {
 pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32]) -> Hit {
     let (geometry_id, primitive_id) = locate(first_ids, candidate.id);
     Hit {
-        t: setup.unscaled(candidate.t),
+        // A ray that starts on a triangle meets it at 0 of either sign.
+        t: setup.unscaled(candidate.t) + 0.0,
         u: candidate.u,
         v: candidate.v,
         geometry_id,
@@ -240,12 +210,85 @@ pub(crate) fn first_ids(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, MeshError>
     Ok(first_ids)
 }
 
+/// Number of each mesh's first vertex over all meshes, and the total at the end.
+fn first_points(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, BuildError> {
+    const LIMIT: usize = u32::MAX as usize;
+    let count = meshes.iter().map(|mesh| mesh.vertices().len()).sum();
+    if count > LIMIT {
+        return Err(BuildError::TreeTooLarge {
+            parts: "vertices",
+            count,
+            limit: LIMIT,
+        });
+    }
+    let mut next = 0;
+    let mut first_points = Vec::with_capacity(meshes.len() + 1);
+    for mesh in meshes {
+        first_points.push(next);
+        next += mesh.vertices().len() as u32;
+    }
+    first_points.push(next);
+    Ok(first_points)
+}
+
 /// Geometry id and primitive id of a triangle, by its number over all meshes.
 #[inline]
 fn locate(first_ids: &[u32], id: u32) -> (u32, u32) {
     // The last mesh that begins at or before it: empty meshes begin where the next one does.
     let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
     (geometry_id as u32, id - first_ids[geometry_id])
+}
+
+/// Fills in the box of each triangle in the caller's coordinates; gives the box around them.
+fn reference_all(meshes: &[&TriangleMesh], references: &mut Vec<PrimitiveRef>) -> Aabb {
+    let count = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
+    // What an earlier build left is overwritten like what is new.
+    references.resize(count, PrimitiveRef::new(Aabb::EMPTY, 0, 0));
+    let (mut bounds, mut rest) = (Bounds::EMPTY, &mut references[..]);
+    for (geometry_id, mesh) in meshes.iter().enumerate() {
+        let (own, others) = rest.split_at_mut(mesh.triangles().len());
+        rest = others;
+        bounds.extend(&reference_mesh(mesh, geometry_id as u32, 0, own));
+    }
+    bounds.to_aabb()
+}
+
+/// The same for the triangles of a mesh from `first` on, at the same time where they are many.
+fn reference_mesh(
+    mesh: &TriangleMesh,
+    geometry_id: u32,
+    first: u32,
+    references: &mut [PrimitiveRef],
+) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    if references.len() > tasks::PIECE_SIZE {
+        let middle = references.len() / 2;
+        let (left, right) = references.split_at_mut(middle);
+        let (left, right) = tasks::join(
+            || reference_mesh(mesh, geometry_id, first, left),
+            || reference_mesh(mesh, geometry_id, first + middle as u32, right),
+        );
+        bounds.extend(&left);
+        bounds.extend(&right);
+        return bounds;
+    }
+    for (primitive_id, reference) in (first..).zip(references) {
+        let own = corners_bounds(mesh.corners(primitive_id));
+        *reference = PrimitiveRef::new(own, geometry_id, primitive_id);
+        bounds.extend(&reference.0);
+    }
+    bounds
+}
+
+/// A box times a power of two: the box of the scaled corners to the last bit, since rounding keeps
+/// order.
+fn scaled(reference: &PrimitiveRef, scale: f32) -> PrimitiveRef {
+    let Aabb { min, max } = reference.0.to_aabb();
+    let bounds = Aabb {
+        min: min * scale,
+        max: max * scale,
+    };
+    PrimitiveRef::new(bounds, reference.geometry_id(), reference.primitive_id())
 }
 
 pub(crate) fn bounds_of(meshes: &[&TriangleMesh]) -> Aabb {

@@ -83,6 +83,16 @@ pub enum BuildError {
         /// Largest magnitude allowed.
         max: f32,
     },
+    /// A tree with more parts than its references can number.
+    #[error("the tree has {count} {parts}, more than the {limit} that can be numbered")]
+    TreeTooLarge {
+        /// What there are too many of.
+        parts: &'static str,
+        /// How many there are.
+        count: usize,
+        /// The largest number allowed.
+        limit: usize,
+    },
     /// A mesh that cannot be numbered.
     #[error(transparent)]
     Mesh(#[from] MeshError),

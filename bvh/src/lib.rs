@@ -15,6 +15,7 @@
 //! ```
 #![deny(unsafe_code)]
 
+mod any_tree;
 mod bounds;
 mod build;
 mod bvh;

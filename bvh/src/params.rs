@@ -51,7 +51,7 @@ pub enum Dynamics {
 pub enum LeafFormat {
     /// One vertex and two edges of each triangle, ready for the intersection test.
     Edges,
-    /// Vertex indices only: less memory, more work (the paper's flag `compact`). Not built yet.
+    /// Vertex indices only: less memory, more work (the paper's flag `compact`).
     Compact,
 }
 
@@ -61,7 +61,7 @@ pub enum LeafFormat {
 pub enum Accuracy {
     /// Möller–Trumbore on stored edges; a ray that meets a shared edge exactly may slip through.
     Fast,
-    /// Watertight (the paper's flag `robust`). Not built yet.
+    /// Watertight (the paper's flag `robust`).
     Robust,
 }
 
@@ -201,15 +201,15 @@ pub const PARAMETERS: [Parameter; 13] = [
     },
     Parameter {
         name: "leaf_format",
-        range: ParameterRange::Words(&["edges", "compact"], &["edges"]),
-        tuned: ParameterRange::Words(&["edges", "compact"], &["edges"]),
+        range: ParameterRange::Words(&["edges", "compact"], &["edges", "compact"]),
+        tuned: ParameterRange::Words(&["edges", "compact"], &["edges", "compact"]),
         changes_hits: false,
         meaning: "compact stores vertex indices in place of edges",
     },
     Parameter {
         name: "accuracy",
-        range: ParameterRange::Words(&["fast", "robust"], &["fast"]),
-        tuned: ParameterRange::Words(&["fast", "robust"], &["fast"]),
+        range: ParameterRange::Words(&["fast", "robust"], &["fast", "robust"]),
+        tuned: ParameterRange::Words(&["fast", "robust"], &["fast", "robust"]),
         changes_hits: true,
         meaning: "robust is watertight at edges and vertices",
     },
@@ -601,7 +601,7 @@ mod tests {
             accuracy: Accuracy::Robust,
             ..BuildParams::default()
         };
-        assert_eq!(params.faults().len(), 10);
+        assert_eq!(params.faults().len(), 8);
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use crate::{
     bounds::Aabb,
-    layout::{node::ChildRef, tree::Tree},
+    layout::{node::ChildRef, tree::Tree, triangles::Block},
     params::BuildParams,
 };
 
@@ -35,13 +35,13 @@ pub struct TreeStats {
     pub sah_blocks: f64,
     /// `traversal_cost · sah_nodes + intersection_cost · sah_blocks`.
     pub sah_cost: f64,
-    /// Bytes of nodes and leaves.
+    /// Bytes of nodes, leaves and, where leaves refer to them, vertices.
     pub bytes: usize,
 }
 
 impl TreeStats {
-    pub(crate) fn of<const N: usize, const W: usize>(
-        tree: &Tree<N, W>,
+    pub(crate) fn of<const N: usize, const W: usize, B: Block>(
+        tree: &Tree<N, W, B>,
         params: &BuildParams,
     ) -> Self {
         let mut stats = Self {
@@ -78,7 +78,7 @@ impl TreeStats {
                 if child.is_leaf() {
                     let size = tree.blocks[child.blocks()]
                         .iter()
-                        .map(|block| block.len())
+                        .map(Block::len)
                         .sum::<usize>();
                     stats.leaves += 1;
                     stats.references += size;

@@ -1,8 +1,11 @@
-//! Every kernel against testing every triangle: the same bits, for every branching factor, every
-//! instruction set, any parameters, any rays.
+//! Every kernel against testing every triangle: the same bits, for every accuracy, branching factor,
+//! leaf format and instruction set, any parameters, any rays.
 
 use proptest::prelude::*;
-use raywright_bvh::{BuildError, BuildParams, Bvh, Hit, Isa, Ray, TriangleMesh, Vec3, reference};
+use raywright_bvh::{
+    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Quality, Ray, TriangleMesh, Vec3,
+    reference,
+};
 
 type Bits = Option<(u32, u32, u32, u32, u32)>;
 
@@ -18,24 +21,38 @@ fn bits(hit: Option<Hit>) -> Bits {
     })
 }
 
-/// Trees of every branching factor and instruction set that this machine has.
-fn trees(meshes: &[&TriangleMesh], params: &BuildParams) -> Vec<Bvh> {
+/// Trees of every kind that has a kernel of its own, and two of widths between, by every
+/// instruction set that this machine has.
+fn trees(meshes: &[&TriangleMesh], params: &BuildParams, accuracy: Accuracy) -> Vec<Bvh> {
     let mut trees = Vec::new();
-    for branching_factor in [2, 4, 8] {
-        let mut params = *params;
-        params.branching_factor = branching_factor;
-        let tree = match Bvh::build(meshes, &params) {
-            Ok(tree) => tree,
-            Err(BuildError::DepthLimit { .. }) => continue,
-            Err(error) => panic!("{error}"),
-        };
-        trees.extend(
-            Isa::ALL
-                .into_iter()
-                .filter_map(|isa| tree.clone().with_isa(isa)),
-        );
+    for branching_factor in [2, 3, 4, 8, 12, 16] {
+        for leaf_format in [LeafFormat::Edges, LeafFormat::Compact] {
+            let mut params = *params;
+            params.branching_factor = branching_factor;
+            params.leaf_format = leaf_format;
+            params.accuracy = accuracy;
+            let tree = match Bvh::build(meshes, &params) {
+                Ok(tree) => tree,
+                Err(BuildError::DepthLimit { .. }) => continue,
+                Err(error) => panic!("{error}"),
+            };
+            trees.extend(
+                Isa::ALL
+                    .into_iter()
+                    .filter_map(|isa| tree.clone().with_isa(isa)),
+            );
+        }
     }
     trees
+}
+
+const ACCURACIES: [Accuracy; 2] = [Accuracy::Fast, Accuracy::Robust];
+
+/// Trees of both accuracies.
+fn all_trees(meshes: &[&TriangleMesh]) -> impl Iterator<Item = Bvh> {
+    ACCURACIES
+        .into_iter()
+        .flat_map(move |accuracy| trees(meshes, &BuildParams::default(), accuracy))
 }
 
 fn check(
@@ -43,15 +60,17 @@ fn check(
     params: &BuildParams,
     rays: &[Ray],
 ) -> Result<usize, TestCaseError> {
-    let trees = trees(meshes, params);
     let mut hits = 0;
-    for ray in rays {
-        let expected = bits(reference::closest_hit(meshes, ray).unwrap());
-        hits += usize::from(expected.is_some());
-        for tree in &trees {
-            let context = format!("{} {:?} {ray:?}", tree.isa(), tree.params());
-            prop_assert_eq!(bits(tree.closest_hit(ray)), expected, "{}", context);
-            prop_assert_eq!(tree.any_hit(ray), expected.is_some(), "{}", context);
+    for accuracy in ACCURACIES {
+        let trees = trees(meshes, params, accuracy);
+        for ray in rays {
+            let expected = bits(reference::closest_hit(meshes, ray, accuracy).unwrap());
+            hits += usize::from(expected.is_some());
+            for tree in &trees {
+                let context = format!("{} {:?} {ray:?}", tree.isa(), tree.params());
+                prop_assert_eq!(bits(tree.closest_hit(ray)), expected, "{}", context);
+                prop_assert_eq!(tree.any_hit(ray), expected.is_some(), "{}", context);
+            }
         }
     }
     Ok(hits)
@@ -80,14 +99,21 @@ fn params() -> impl Strategy<Value = BuildParams> {
     (
         9u32..40,
         1u32..=32,
-        1u32..=32,
-        1u32..=32,
+        1u32..=64,
+        1u32..=64,
         0f32..10.0,
         0f32..10.0,
+        prop::sample::select(vec![
+            Quality::Morton,
+            Quality::BinnedSah,
+            Quality::SpatialSplits,
+        ]),
     )
         .prop_map(
-            |(depth, block, min_leaf, max_leaf, traversal, intersection)| {
+            |(depth, block, min_leaf, max_leaf, traversal, intersection, quality)| {
                 let mut params = BuildParams::default();
+                params.quality = quality;
+                params.split_budget = 2.0;
                 params.max_depth = depth;
                 params.sah_block_size = block;
                 params.min_leaf_size = min_leaf;
@@ -119,7 +145,7 @@ fn rays(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
     fn random_triangles(
@@ -192,18 +218,23 @@ fn a_power_of_two_changes_no_bit() {
         ];
         TriangleMesh::new(v.map(|v| v * s).to_vec(), vec![[0, 1, 2]]).unwrap()
     };
-    let hit = |s: f32| {
+    let hit = |s: f32, accuracy: Accuracy| {
         let mesh = triangle(s);
-        let tree = Bvh::build(&[&mesh], &BuildParams::default()).unwrap();
+        let mut params = BuildParams::default();
+        params.accuracy = accuracy;
+        let tree = Bvh::build(&[&mesh], &params).unwrap();
         tree.closest_hit(&Ray::new(
             Vec3::new(0.4, 0.3, 2.0) * s,
             Vec3::new(0.03, 0.02, -1.0) * s,
         ))
         .unwrap()
     };
-    let expected = hit(1.0);
-    for exponent in -90..=90 {
-        assert_eq!(hit(2f32.powi(exponent)), expected, "2^{exponent}");
+    for accuracy in ACCURACIES {
+        let expected = hit(1.0, accuracy);
+        for exponent in -90..=90 {
+            let got = hit(2f32.powi(exponent), accuracy);
+            assert_eq!(got, expected, "2^{exponent}, {accuracy:?}");
+        }
     }
 }
 
@@ -221,10 +252,7 @@ fn equal_distances_go_to_the_lowest_ids() {
         .unwrap()
     };
     let (empty, far, near) = (TriangleMesh::default(), quad(-2.0), quad(-1.0));
-    for tree in trees(
-        &[&empty, &far, &empty, &near, &near],
-        &BuildParams::default(),
-    ) {
+    for tree in all_trees(&[&empty, &far, &empty, &near, &near]) {
         let hit = tree.closest_hit(&Ray::new(Vec3::ZERO, -Vec3::Z)).unwrap();
         assert_eq!((hit.geometry_id, hit.primitive_id, hit.t), (3, 0, 1.0));
     }
@@ -247,7 +275,7 @@ fn rays_that_can_hit_nothing() {
         Ray::new(origin, Vec3::ONE).with_range(0.0, -inf),
         Ray::new(Vec3::splat(-1e30), Vec3::ONE),
     ];
-    for tree in trees(&[&mesh], &BuildParams::default()) {
+    for tree in all_trees(&[&mesh]) {
         assert!(tree.any_hit(&Ray::new(origin, Vec3::ONE)));
         assert!(
             tree.any_hit(&Ray::new(origin, Vec3::ONE).with_range(-5.0, inf)),
@@ -278,7 +306,7 @@ fn interval_ends_belong_to_the_interval() {
     .unwrap();
     let ray = Ray::new(Vec3::ZERO, -Vec3::Z);
     let (before, after) = (1f32.next_down(), 1f32.next_up());
-    for tree in trees(&[&mesh], &BuildParams::default()) {
+    for tree in all_trees(&[&mesh]) {
         for (t_min, t_max, hit) in [
             (1.0, 1.0, true),
             (0.0, 1.0, true),

@@ -14,7 +14,7 @@ pub(crate) struct RunOptions {
     /// Threads that build and render; 0 for all
     #[arg(long, default_value_t = 0, env = "RAYWRIGHT_THREADS")]
     pub(crate) threads: usize,
-    /// Instruction set of the traversal kernels: portable or avx2; the best by default
+    /// Instruction set of the traversal kernels: portable, avx2 or avx512; the best by default
     #[arg(long, env = "RAYWRIGHT_ISA", value_parser = isa)]
     pub(crate) isa: Option<Isa>,
 }

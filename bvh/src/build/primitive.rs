@@ -5,6 +5,7 @@
 //! halved), areas are half areas with one fixed order of operations, so that trees can be compared
 //! with those of Embree to the last bit.
 
+use glam::Vec3;
 use wide::{f32x4, f32x8};
 
 use super::LeafReference;
@@ -143,6 +144,13 @@ impl PrimitiveRef {
         self.0.0[axis] - self.0.0[axis + 4]
     }
 
+    /// The lower and the upper end of the box on an axis, which is below 3.
+    #[inline(always)]
+    pub(crate) fn range_on(&self, axis: usize) -> (f32, f32) {
+        let axis = axis & 3;
+        (self.0.0[axis], -self.0.0[axis + 4])
+    }
+
     /// The order in which Embree sorts the primitives of a leaf.
     pub(crate) fn sort_key(&self) -> u64 {
         u64::from(self.primitive_id()) << 32 | u64::from(self.geometry_id())
@@ -227,6 +235,19 @@ pub(crate) trait BoxLanes: Halves {
     #[inline(always)]
     fn to_bounds(self) -> Bounds {
         Bounds(self.store())
+    }
+
+    /// The box of a point.
+    #[inline(always)]
+    fn of_point(p: Vec3) -> Self {
+        Self::load(&[p.x, p.y, p.z, 0.0, -p.x, -p.y, -p.z, 0.0])
+    }
+
+    /// Whether the box holds no point: lower + −upper is positive on an axis.
+    #[inline(always)]
+    fn is_empty(self) -> bool {
+        let excess = self.add(self.swap_halves());
+        Self::bits(excess.le(Self::splat(0.0))) & 0b111 != 0b111
     }
 
     /// The box of the doubled centroid: (lower, −upper) − (−upper, lower).

@@ -207,6 +207,7 @@ impl<'a> Range<'a> {
 #[derive(Default)]
 struct Memory {
     bins: binning::BinPair,
+    spatial_bins: spatial::Bins,
 }
 
 /// Builds the subtree over a range at a level, the root being level 1.
@@ -245,6 +246,8 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
             object_sah,
             &overlap,
             self.block_shift,
+            self.isa,
+            &mut memory.spatial_bins,
         );
         spatial.map(Split::Spatial).or(object.map(Split::Object))
     }

@@ -7,13 +7,17 @@
 //! which only serial code changes, and not on threads.
 
 use glam::Vec3;
-use wide::f32x4;
+use wide::{f32x4, f32x8};
 
 use super::{
     LeafReference,
     binning::Rounding,
-    primitive::{Bounds, PrimitiveRef, RangeBounds},
+    primitive::{Bounds, BoxLanes, PrimitiveRef, RangeBounds},
     tasks,
+};
+use crate::simd::{
+    self, Isa,
+    build::{EightLanes, Halves},
 };
 
 /// Bins of spatial splits.
@@ -89,24 +93,29 @@ impl Mapping {
     /// Where bin `plane` begins on an axis.
     #[inline(always)]
     fn position(&self, axis: usize, plane: usize) -> f32 {
-        plane as f32 * self.width.to_array()[axis] + self.offset.to_array()[axis]
+        let axis = axis & 3;
+        plane as i32 as f32 * self.width.to_array()[axis] + self.offset.to_array()[axis]
     }
 }
 
-#[derive(Clone)]
-struct Bins {
+/// The bins of the three axes.
+pub(crate) struct Bins {
     bounds: [[Bounds; BINS]; 3],
     begins: [[u32; BINS]; 3],
     ends: [[u32; BINS]; 3],
 }
 
-impl Bins {
-    const EMPTY: Self = Self {
-        bounds: [[Bounds::EMPTY; BINS]; 3],
-        begins: [[0; BINS]; 3],
-        ends: [[0; BINS]; 3],
-    };
+impl Default for Bins {
+    fn default() -> Self {
+        Self {
+            bounds: [[Bounds::EMPTY; BINS]; 3],
+            begins: [[0; BINS]; 3],
+            ends: [[0; BINS]; 3],
+        }
+    }
+}
 
+impl Bins {
     fn merge(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             for bin in 0..BINS {
@@ -161,6 +170,8 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         object_sah: f32,
         overlap: &Bounds,
         block_shift: u32,
+        isa: Isa,
+        bins: &mut Bins,
     ) -> Option<SpatialSplit> {
         let overlap_area = area(overlap);
         if !(overlap_area >= ROOT_OVERLAP * self.root_area
@@ -169,15 +180,27 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
             return None;
         }
         let mapping = Mapping::new(&bounds.geometry);
-        let bins = if tasks::in_pieces(references.len()) {
-            tasks::map_merge(
+        let fill = |references: &[PrimitiveRef], bins: &mut Bins| {
+            let kernel = Fill::<R, C> {
+                cutting: self,
+                mapping: &mapping,
                 references,
-                &|piece| self.fill::<R>(&mapping, piece),
-                &|a: Bins, b| a.merge(&b),
-            )
-        } else {
-            self.fill::<R>(&mapping, references)
+                bins,
+                rounding: std::marker::PhantomData,
+            };
+            simd::build::run(isa, kernel)
         };
+        if tasks::in_pieces(references.len()) {
+            let of_piece = |piece: &[PrimitiveRef]| {
+                let mut bins = Bins::default();
+                fill(piece, &mut bins);
+                bins
+            };
+            *bins = tasks::map_merge(references, &of_piece, &|a: Bins, b| a.merge(&b));
+        } else {
+            *bins = Bins::default();
+            fill(references, bins);
+        }
         let scale = mapping.scale.to_array();
         let mut best: Option<SpatialSplit> = None;
         for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
@@ -199,8 +222,13 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         })
     }
 
-    fn fill<R: Rounding>(&self, mapping: &Mapping, references: &[PrimitiveRef]) -> Bins {
-        let mut bins = Bins::EMPTY;
+    #[inline(always)]
+    fn fill<R: Rounding, L: Halves>(
+        &self,
+        bins: &mut Bins,
+        mapping: &Mapping,
+        references: &[PrimitiveRef],
+    ) {
         let scale = mapping.scale.to_array();
         for reference in references {
             if reference.budget() <= 1 {
@@ -227,17 +255,9 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                     continue;
                 }
                 let corners = *corners.get_or_insert_with(|| self.corners_of(reference));
-                chop(
-                    &mut bins,
-                    mapping,
-                    axis,
-                    first..=last,
-                    &reference.0,
-                    &corners,
-                );
+                chop::<L>(bins, mapping, axis, (first, last), reference, &corners);
             }
         }
-        bins
     }
 
     /// Cuts the references that the plane meets; new ones take the room behind the first `n`.
@@ -262,7 +282,9 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                 continue;
             }
             let corners = self.corners_of(&reference);
-            let [left, right] = clip(&corners, split.axis, position, &reference.0);
+            let [left, right] = Cutter::<f32x8>::new(&corners, split.axis)
+                .cut(position, f32x8::of(&reference.0))
+                .map(BoxLanes::to_bounds);
             if left.is_empty() || right.is_empty() {
                 if self.empty_side_ends_budget {
                     references[index] = reference.with_budget(0);
@@ -279,8 +301,28 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         count
     }
 
-    fn corners_of(&self, reference: &PrimitiveRef) -> [f32x4; 3] {
-        (self.corners)(reference.cut_leaf_reference()).map(|v| f32x4::new([v.x, v.y, v.z, 0.0]))
+    #[inline(always)]
+    fn corners_of(&self, reference: &PrimitiveRef) -> [Vec3; 3] {
+        (self.corners)(reference.cut_leaf_reference())
+    }
+}
+
+/// Bins references, cut at the planes.
+struct Fill<'a, R, C> {
+    cutting: &'a Cutting<C>,
+    mapping: &'a Mapping,
+    references: &'a [PrimitiveRef],
+    bins: &'a mut Bins,
+    rounding: std::marker::PhantomData<R>,
+}
+
+impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> EightLanes for Fill<'_, R, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Halves>(self) {
+        self.cutting
+            .fill::<R, L>(self.bins, self.mapping, self.references);
     }
 }
 
@@ -294,30 +336,33 @@ impl SpatialSplit {
 }
 
 /// Adds a primitive that spans several bins of an axis, part by part.
-fn chop(
+#[inline(always)]
+fn chop<L: Halves>(
     bins: &mut Bins,
     mapping: &Mapping,
     axis: usize,
-    span: std::ops::RangeInclusive<usize>,
-    bounds: &Bounds,
-    corners: &[f32x4; 3],
+    (mut first, mut last): (usize, usize),
+    reference: &PrimitiveRef,
+    corners: &[Vec3; 3],
 ) {
-    let (mut first, mut last) = span.into_inner();
     let (mut begin, mut end) = (first, last);
     // The bins were found by one rounding, the planes have another.
-    while first < last && mapping.position(axis, first + 1) <= bounds.lower().to_array()[axis] {
+    let (lower, upper) = reference.range_on(axis);
+    while first < last && mapping.position(axis, first + 1) <= lower {
         first += 1;
     }
-    while first < last && mapping.position(axis, last) >= bounds.upper().to_array()[axis] {
+    while first < last && mapping.position(axis, last) >= upper {
         last -= 1;
     }
-    let mut rest = *bounds;
+    let cutter = Cutter::new(corners, axis);
+    let mut rest = L::of(&reference.0);
     for bin in first..last {
-        let [left, right] = clip(corners, axis, mapping.position(axis, bin + 1), &rest);
+        let [left, right] = cutter.cut(mapping.position(axis, bin + 1), rest);
         if left.is_empty() {
             begin += 1;
         }
-        bins.bounds[axis][bin].extend(&left);
+        let bounds = &mut bins.bounds[axis][bin];
+        *bounds = L::of(bounds).min(left).to_bounds();
         rest = right;
     }
     if rest.is_empty() {
@@ -325,30 +370,113 @@ fn chop(
     }
     bins.begins[axis][begin] += 1;
     bins.ends[axis][end] += 1;
-    bins.bounds[axis][last].extend(&rest);
+    let bounds = &mut bins.bounds[axis][last];
+    *bounds = L::of(bounds).min(rest).to_bounds();
 }
 
-/// The boxes of the two parts of a triangle on both sides of a plane, within `bounds`.
-#[inline(always)]
-fn clip(corners: &[f32x4; 3], axis: usize, position: f32, bounds: &Bounds) -> [Bounds; 2] {
-    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
-    for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-        let (from, to) = (corners[from], corners[to]);
-        let (a, b) = (from.to_array()[axis], to.to_array()[axis]);
-        if a <= position {
-            left.extend_by_point(from);
-        }
-        if a >= position {
-            right.extend_by_point(from);
-        }
-        if (a < position && position < b) || (b < position && position < a) {
-            let t = (position - a) * (1.0 / (b - a));
-            let crossing = f32x4::splat(t) * (to - from) + from;
-            left.extend_by_point(crossing);
-            right.extend_by_point(crossing);
+/// A triangle that is cut by planes across one axis. Points are boxes of one point.
+struct Cutter<L> {
+    /// From the lowest corner to the highest on the axis.
+    corners: [L; 3],
+    heights: [f32; 3],
+    /// From lowest to highest, lowest to middle, middle to highest.
+    edges: [Edge<L>; 3],
+}
+
+/// An edge, in the direction in which the triangle has it: rounding depends on it.
+struct Edge<L> {
+    start: L,
+    direction: L,
+    start_height: f32,
+    per_height: f32,
+}
+
+impl<L: Halves> Edge<L> {
+    #[inline(always)]
+    fn new(corners: &[L; 3], heights: &[f32; 3], a: usize, b: usize) -> Self {
+        // Edges run from each corner to the next.
+        let (from, to) = if (a + 1) % 3 == b { (a, b) } else { (b, a) };
+        Self {
+            start: corners[from],
+            direction: corners[to].sub(corners[from]),
+            start_height: heights[from],
+            per_height: 1.0 / (heights[to] - heights[from]),
         }
     }
-    [left.intersection(bounds), right.intersection(bounds)]
+
+    /// Where the edge crosses a plane.
+    #[inline(always)]
+    fn at(&self, position: f32) -> L {
+        let t = (position - self.start_height) * self.per_height;
+        L::splat(t).mul(self.direction).add(self.start)
+    }
+}
+
+impl<L: Halves> Cutter<L> {
+    /// Closures are spelled out here: one that were not inlined would lose the instruction set.
+    #[inline(always)]
+    fn new([a, b, c]: &[Vec3; 3], axis: usize) -> Self {
+        let corners = [L::of_point(*a), L::of_point(*b), L::of_point(*c)];
+        let heights = [a[axis], b[axis], c[axis]];
+        let (mut low, mut middle, mut high) = (0, 1, 2);
+        if heights[middle] < heights[low] {
+            (low, middle) = (middle, low);
+        }
+        if heights[high] < heights[middle] {
+            (middle, high) = (high, middle);
+        }
+        if heights[middle] < heights[low] {
+            (low, middle) = (middle, low);
+        }
+        Self {
+            edges: [
+                Edge::new(&corners, &heights, low, high),
+                Edge::new(&corners, &heights, low, middle),
+                Edge::new(&corners, &heights, middle, high),
+            ],
+            corners: [corners[low], corners[middle], corners[high]],
+            heights: [heights[low], heights[middle], heights[high]],
+        }
+    }
+
+    /// The boxes of the two parts of the triangle on both sides of a plane, within `bounds`.
+    #[inline(always)]
+    fn cut(&self, position: f32, bounds: L) -> [L; 2] {
+        let [low, middle, high] = self.heights;
+        let (mut left, mut right) = (L::of(&Bounds::EMPTY), L::of(&Bounds::EMPTY));
+        if low <= position {
+            left = self.corners[0];
+        }
+        if position <= high {
+            right = self.corners[2];
+        }
+        if position < middle {
+            right = right.min(self.corners[1]);
+        } else if middle < position {
+            left = left.min(self.corners[1]);
+        } else {
+            left = left.min(self.corners[1]);
+            right = right.min(self.corners[1]);
+        }
+        if low < position && position < high {
+            let mut crossing = self.edges[0].at(position);
+            if position < middle {
+                crossing = crossing.min(self.edges[1].at(position));
+            } else if middle < position {
+                crossing = crossing.min(self.edges[2].at(position));
+            }
+            left = left.min(crossing);
+            right = right.min(crossing);
+        }
+        // A plane at the height of several corners; rare enough to be asked last.
+        if high <= position {
+            left = left.min(self.corners[2]);
+        }
+        if position <= low {
+            right = right.min(self.corners[0]);
+        }
+        [left.max(bounds), right.max(bounds)]
+    }
 }
 
 /// Surface area; 0 of an empty box.

@@ -6,24 +6,26 @@
 //! *Accelerated Single Ray Tracing for Wide Vector Units*, 2017 (order by octant), and Nah,
 //! Manocha, *SATO: Surface Area Traversal Order for Shadow Ray Tracing*, 2014 (slots by area).
 //!
-//! Bytes: 64 for 2 children, 128 for 4, 256 for 8.
+//! Bytes: 64 for 2 children, 128 for 4, 256 for 8, 512 for 16.
 
 use crate::bounds::Aabb;
 
 /// Where a child is: an inner node or a leaf.
 ///
-/// Bit 31 tells a leaf. A leaf has its number of triangle blocks less one in bits 28 to 30 and its
-/// first block in bits 0 to 27; an inner node has its index.
+/// Bit 31 tells a leaf. A leaf has its number of triangle blocks less one in bits 27 to 30 and its
+/// first block in bits 0 to 26; an inner node has its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ChildRef(pub(crate) u32);
 
 impl ChildRef {
     const LEAF: u32 = 1 << 31;
-    const BLOCK_COUNT_SHIFT: u32 = 28;
+    const BLOCK_COUNT_SHIFT: u32 = 27;
     /// The most blocks that a leaf can have.
-    pub(crate) const MAX_BLOCKS: u32 = 8;
+    pub(crate) const MAX_BLOCKS: u32 = 16;
     /// How many blocks can be told apart.
     pub(crate) const BLOCK_LIMIT: usize = 1 << Self::BLOCK_COUNT_SHIFT;
+    /// How many nodes can be told apart.
+    pub(crate) const NODE_LIMIT: usize = Self::LEAF as usize;
 
     pub(crate) fn inner(node: u32) -> Self {
         debug_assert_eq!(node & Self::LEAF, 0);
@@ -46,7 +48,7 @@ impl ChildRef {
     #[inline(always)]
     pub(crate) fn blocks(self) -> std::ops::Range<usize> {
         let first = (self.0 as usize) & (Self::BLOCK_LIMIT - 1);
-        first..first + ((self.0 >> Self::BLOCK_COUNT_SHIFT) as usize & 7) + 1
+        first..first + ((self.0 >> Self::BLOCK_COUNT_SHIFT) as usize & 15) + 1
     }
 }
 
@@ -77,14 +79,14 @@ impl<const N: usize, const W: usize> Default for Node<N, W> {
 }
 
 impl<const N: usize, const W: usize> Node<N, W> {
-    /// Bits of the order of one octant: 32 for N = 8, 8 for N = 4 and 2.
+    /// Bits of the order of one octant: 64 for N = 16, 32 for N = 8, 8 for N = 4 and 2.
     const OCTANT_BITS: usize = 4 * W;
     const SLOT_BITS: u32 = N.trailing_zeros();
     /// The order that takes slots as they lie.
-    pub(crate) const SLOT_ORDER: u32 = {
+    pub(crate) const SLOT_ORDER: u64 = {
         let (mut order, mut slot) = (0, 0);
-        while slot < N as u32 {
-            order |= slot << (slot * Self::SLOT_BITS);
+        while slot < N as u64 {
+            order |= slot << (slot * Self::SLOT_BITS as u64);
             slot += 1;
         }
         order
@@ -93,55 +95,58 @@ impl<const N: usize, const W: usize> Node<N, W> {
     /// The slots from the farthest to the nearest for rays of an octant: fields of log2(N) bits,
     /// lowest first. Bit a of `octant` is set if the direction is negative along axis a.
     #[inline(always)]
-    pub(crate) fn order(&self, octant: usize) -> u32 {
+    pub(crate) fn order(&self, octant: usize) -> u64 {
         let bit = octant * Self::OCTANT_BITS;
-        self.order[bit / 32] >> (bit % 32)
+        let low = u64::from(self.order[bit / 32] >> (bit % 32));
+        if Self::OCTANT_BITS <= 32 {
+            low
+        } else {
+            low | u64::from(self.order[bit / 32 + 1]) << 32
+        }
     }
 
     /// Makes a node of boxes and references, which must come in ascending order of area.
     pub(crate) fn new(children: &[(Aabb, ChildRef)]) -> Self {
         let mut node = Self::default();
+        let mut centres = [[0.0; N]; 3];
         for (slot, (bounds, reference)) in children.iter().enumerate() {
-            for axis in 0..3 {
+            for (axis, centres) in centres.iter_mut().enumerate() {
                 node.planes[2 * axis][slot] = bounds.min[axis];
                 node.planes[2 * axis + 1][slot] = bounds.max[axis];
+                centres[slot] = bounds.min[axis] + bounds.max[axis];
             }
             node.children[slot] = reference.0;
         }
-        let centres: [[f32; 3]; N] = std::array::from_fn(|slot| match children.get(slot) {
-            Some((bounds, _)) => (bounds.min + bounds.max).to_array(),
-            None => [0.0; 3],
-        });
         // Opposite octants see the children in opposite order, so that four sorts serve eight.
         for octant in 0..4 {
             let sign = |axis: usize| if octant >> axis & 1 == 1 { -1.0 } else { 1.0 };
-            let mut slots: [u32; N] = std::array::from_fn(|slot| slot as u32);
-            let key = |slot: &u32| {
-                let c = centres[*slot as usize];
-                c[0] * sign(0) + c[1] * sign(1) + c[2] * sign(2)
-            };
-            // Insertion sort, farthest first: at most eight elements, and stable.
-            for i in 1..children.len() {
-                let mut at = i;
-                while at > 0 && key(&slots[at - 1]) < key(&slots[at]) {
-                    slots.swap(at - 1, at);
-                    at -= 1;
-                }
+            let signs = [sign(0), sign(1), sign(2)];
+            let mut nearness = [f32::INFINITY; N];
+            for slot in 0..children.len() {
+                let [x, y, z] = [0, 1, 2].map(|axis| centres[axis][slot] * signs[axis]);
+                nearness[slot] = -(x + y + z);
             }
-            node.set_order(octant, &slots);
-            slots[..children.len()].reverse();
-            node.set_order(7 - octant, &slots);
+            let (mut far_first, mut near_first) = (0, 0);
+            for (slot, &place) in ranks(&nearness).iter().enumerate() {
+                let opposite = match children.len() {
+                    n if slot < n => n as u32 - 1 - place,
+                    _ => slot as u32,
+                };
+                far_first |= (slot as u64) << (place * Self::SLOT_BITS);
+                near_first |= (slot as u64) << (opposite * Self::SLOT_BITS);
+            }
+            node.set_order(octant, far_first);
+            node.set_order(7 - octant, near_first);
         }
         node
     }
 
-    fn set_order(&mut self, octant: usize, slots: &[u32; N]) {
-        let mut order = 0;
-        for (place, slot) in slots.iter().enumerate() {
-            order |= slot << (place as u32 * Self::SLOT_BITS);
-        }
+    fn set_order(&mut self, octant: usize, order: u64) {
         let bit = octant * Self::OCTANT_BITS;
-        self.order[bit / 32] |= order << (bit % 32);
+        self.order[bit / 32] |= (order as u32) << (bit % 32);
+        if Self::OCTANT_BITS > 32 {
+            self.order[bit / 32 + 1] = (order >> 32) as u32;
+        }
     }
 
     /// The box of a child; empty for an empty slot.
@@ -154,17 +159,33 @@ impl<const N: usize, const W: usize> Node<N, W> {
     }
 }
 
+/// The place of each key in ascending order, equal keys in the order in which they come. All pairs
+/// are compared, which for so few is faster than sorting, since nothing depends on the outcome of a
+/// comparison but a sum.
+pub(super) fn ranks<const N: usize>(keys: &[f32; N]) -> [u32; N] {
+    let mut ranks = [0; N];
+    for (other, &other_key) in keys.iter().enumerate() {
+        for (slot, &key) in keys.iter().enumerate() {
+            let precedes = (other_key < key) | ((other_key == key) & (other < slot));
+            ranks[slot] += u32::from(precedes);
+        }
+    }
+    ranks
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::layout::triangles::BLOCK_SIZE;
 
     #[test]
     fn sizes_are_whole_cache_lines() {
         assert_eq!(size_of::<Node<2, 2>>(), 64);
         assert_eq!(size_of::<Node<4, 2>>(), 128);
         assert_eq!(size_of::<Node<8, 8>>(), 256);
+        assert_eq!(size_of::<Node<16, 16>>(), 512);
     }
 
     fn order_is_a_permutation_from_far_to_near<const N: usize, const W: usize>() {
@@ -211,11 +232,17 @@ mod tests {
         order_is_a_permutation_from_far_to_near::<2, 2>();
         order_is_a_permutation_from_far_to_near::<4, 2>();
         order_is_a_permutation_from_far_to_near::<8, 8>();
+        order_is_a_permutation_from_far_to_near::<16, 16>();
     }
 
     #[test]
     fn references_keep_what_they_are_given() {
-        for (first, blocks) in [(0, 1), (12345, 8), ((1 << 28) - 1, 3)] {
+        assert_eq!(
+            ChildRef::MAX_BLOCKS as usize * BLOCK_SIZE,
+            64,
+            "max_leaf_size"
+        );
+        for (first, blocks) in [(0, 1), (12345, 16), ((1 << 27) - 1, 3)] {
             let leaf = ChildRef::leaf(first, blocks);
             assert!(leaf.is_leaf());
             assert_eq!(leaf.blocks(), first as usize..(first + blocks) as usize);

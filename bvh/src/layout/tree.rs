@@ -2,18 +2,20 @@
 
 use super::{
     node::{ChildRef, Node},
-    triangles::TriangleBlock,
+    triangles::{Block, Point},
 };
 
 /// Nodes depth first, the root first; an empty scene has no node. Coordinates are scaled by the
 /// power of two that the tree's owner keeps.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Tree<const N: usize, const W: usize> {
+#[derive(Clone, Debug)]
+pub(crate) struct Tree<const N: usize, const W: usize, B> {
     pub(crate) nodes: Vec<Node<N, W>>,
-    pub(crate) blocks: Vec<TriangleBlock>,
+    pub(crate) blocks: Vec<B>,
+    /// What the blocks refer to; empty for blocks that hold their triangles themselves.
+    pub(crate) points: Vec<Point>,
 }
 
-impl<const N: usize, const W: usize> Tree<N, W> {
+impl<const N: usize, const W: usize, B: Block> Tree<N, W, B> {
     /// The children in use of a node, with their slots.
     pub(crate) fn children(&self, node: u32) -> impl Iterator<Item = (usize, ChildRef)> {
         let node = &self.nodes[node as usize];
@@ -23,6 +25,6 @@ impl<const N: usize, const W: usize> Tree<N, W> {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..])
+        size_of_val(&self.nodes[..]) + size_of_val(&self.blocks[..]) + size_of_val(&self.points[..])
     }
 }

@@ -9,22 +9,27 @@ use std::arch::x86_64::{
     __m128, __m256, __m256i, _CMP_LE_OQ, _CMP_NEQ_OQ, _mm_add_ps, _mm_and_ps, _mm_andnot_ps,
     _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_max_ps, _mm_min_ps, _mm_movemask_ps,
     _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps, _mm_sub_ps, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
-    _mm256_and_si256, _mm256_andnot_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps,
-    _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps,
-    _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
+    _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps,
+    _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256,
+    _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
     _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
-    _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_xor_ps,
+    _mm256_slli_epi32, _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256,
+    _mm256_sub_ps, _mm256_xor_ps,
 };
 
-use super::{Lanes, stack::Stack};
+use super::{
+    Lanes,
+    portable::{Half, Halves},
+    stack::Stack,
+};
 
 /// Four lanes in an SSE register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct F32x4(__m128);
+pub(crate) struct F32x4(pub(super) __m128);
 
 /// Eight lanes in an AVX register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct F32x8(__m256);
+pub(crate) struct F32x8(pub(super) __m256);
 
 /// The result of a comparison of four lanes.
 #[derive(Clone, Copy, Debug)]
@@ -34,16 +39,18 @@ pub(crate) struct Mask4(__m128);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mask8(__m256);
 
+/// Also for `avx512`, with the argument of its header in place of this one's.
 macro_rules! lanes_by_intrinsics {
     ($lanes:ident, $mask:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $fmadd:ident, $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
-     $cmp:ident, $movemask:ident $(, $push:item)?) => {
+     $cmp:ident, $and_mask:ident, $movemask:ident $(, $push:item)?) => {
         impl std::ops::BitAnd for $mask {
             type Output = Self;
             #[inline(always)]
             fn bitand(self, other: Self) -> Self {
-                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
-                Self(unsafe { $and(self.0, other.0) })
+                // SAFETY: the instructions are available wherever a value of this type exists
+                // (file header).
+                Self(unsafe { $and_mask(self.0, other.0) })
             }
         }
 
@@ -52,7 +59,7 @@ macro_rules! lanes_by_intrinsics {
 
             #[inline(always)]
             fn splat(value: f32) -> Self {
-                // SAFETY: only kernels entered after AVX2 was detected call this (file header).
+                // SAFETY: only kernels entered after detection call this (file header).
                 Self(unsafe { $set1(value) })
             }
             #[inline(always)]
@@ -64,14 +71,14 @@ macro_rules! lanes_by_intrinsics {
             #[inline(always)]
             fn store(self) -> [f32; $n] {
                 let mut array = [0.0; $n];
-                // SAFETY: AVX2 is available (file header); the array holds exactly the lanes that
-                // are written, and the unaligned store asks for no alignment.
+                // SAFETY: as `splat`; the array holds exactly the lanes that are written, and the unaligned store asks for no alignment.
                 unsafe { $store(array.as_mut_ptr(), self.0) };
                 array
             }
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                // SAFETY: AVX2 is available wherever a value of this type exists (file header).
+                // SAFETY: the instructions are available wherever a value of this type exists
+                // (file header).
                 Self(unsafe { $add(self.0, other.0) })
             }
             #[inline(always)]
@@ -134,6 +141,8 @@ macro_rules! lanes_by_intrinsics {
     };
 }
 
+pub(super) use lanes_by_intrinsics;
+
 lanes_by_intrinsics!(
     F32x4,
     Mask4,
@@ -152,6 +161,7 @@ lanes_by_intrinsics!(
     _mm_andnot_ps,
     _mm_xor_ps,
     _mm_cmp_ps,
+    _mm_and_ps,
     _mm_movemask_ps
 );
 
@@ -173,38 +183,127 @@ lanes_by_intrinsics!(
     _mm256_andnot_ps,
     _mm256_xor_ps,
     _mm256_cmp_ps,
+    _mm256_and_ps,
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u32, stack: &mut Stack) {
-        // SAFETY: AVX2 is available (file header). The loads read the eight words of `children`
-        // and of one row of the table, whose index is below 256 because only eight bits of a
-        // mask of eight lanes can be set.
-        let (references, distances) = unsafe {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+        // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
+        let (slots, children) = unsafe {
             let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            let slots = _mm256_and_si256(
-                _mm256_srlv_epi32(_mm256_set1_epi32(order as i32), fields),
-                _mm256_set1_epi32(7),
-            );
-            // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
-            let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
-            let signs =
-                std::arch::x86_64::_mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
-            let sorted = _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_permutevar8x32_epi32(
-                signs, slots,
-            )));
-            let close =
-                _mm256_loadu_si256(COMPRESS[sorted as usize & 255].as_ptr().cast::<__m256i>());
-            let slots = _mm256_permutevar8x32_epi32(slots, close);
-            let children = _mm256_loadu_si256(children.as_ptr().cast::<__m256i>());
+            let order = _mm256_set1_epi32(order as u32 as i32);
             (
-                _mm256_permutevar8x32_epi32(children, slots),
-                _mm256_castps_si256(_mm256_permutevar8x32_ps(self.0, slots)),
+                _mm256_and_si256(_mm256_srlv_epi32(order, fields), _mm256_set1_epi32(7)),
+                _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()),
             )
         };
-        stack.push_eight(references, distances, mask.count_ones());
+        let sorted = sorted_mask(mask, slots);
+        // SAFETY: as above.
+        let (references, distances) = unsafe {
+            let slots = _mm256_permutevar8x32_epi32(slots, closing(sorted));
+            (
+                _mm256_permutevar8x32_epi32(children, slots),
+                _mm256_permutevar8x32_ps(self.0, slots),
+            )
+        };
+        push_eight(stack, references, distances, mask.count_ones());
     }
 );
+
+impl Half for F32x8 {
+    #[inline(always)]
+    fn push_children_of_both(
+        both: Halves<Self>,
+        mask: u32,
+        children: &[u32; 16],
+        order: u64,
+        stack: &mut Stack<16>,
+    ) {
+        for half in 0..2 {
+            // SAFETY: AVX2 is available (file header). The loads read eight words each of the
+            // sixteen of `children`.
+            let (sorted, references, distances) = unsafe {
+                let fields = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+                let order = _mm256_set1_epi32((order >> (32 * half)) as u32 as i32);
+                let slots = _mm256_srlv_epi32(order, fields);
+                // Bit 3 of a slot, moved to the sign, tells which half it is in.
+                let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(slots));
+                let low = sorted_mask(mask & 255, slots);
+                let high = sorted_mask(mask >> 8, slots);
+                let is_high = _mm256_movemask_ps(upper) as u32;
+                let sorted = low & !is_high | high & is_high;
+                let close = closing(sorted);
+                let slots = _mm256_permutevar8x32_epi32(slots, close);
+                let upper = _mm256_permutevar8x32_ps(upper, close);
+                let words = children.as_ptr().cast::<__m256i>();
+                let references = [
+                    _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words), slots),
+                    _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words.add(1)), slots),
+                ];
+                let distances = [
+                    _mm256_permutevar8x32_ps(both.0.0, slots),
+                    _mm256_permutevar8x32_ps(both.1.0, slots),
+                ];
+                (
+                    sorted,
+                    _mm256_castps_si256(_mm256_blendv_ps(
+                        _mm256_castsi256_ps(references[0]),
+                        _mm256_castsi256_ps(references[1]),
+                        upper,
+                    )),
+                    _mm256_blendv_ps(distances[0], distances[1], upper),
+                )
+            };
+            push_eight(stack, references, distances, sorted.count_ones());
+        }
+    }
+}
+
+/// The bits of a mask of eight lanes in the order of `slots`, of which the lowest three bits count.
+#[inline(always)]
+fn sorted_mask(mask: u32, slots: __m256i) -> u32 {
+    // SAFETY: AVX2 is available wherever a vector of this module exists (file header).
+    unsafe {
+        // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
+        let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
+        let signs = _mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
+        let sorted = _mm256_permutevar8x32_epi32(signs, slots);
+        _mm256_movemask_ps(_mm256_castsi256_ps(sorted)) as u32
+    }
+}
+
+/// The permutation that closes the gaps of a mask of eight lanes.
+#[inline(always)]
+fn closing(mask: u32) -> __m256i {
+    let row = &COMPRESS[mask as usize & 255];
+    // SAFETY: AVX2 is available (file header); the load reads the eight words of the row.
+    unsafe { _mm256_loadu_si256(row.as_ptr().cast::<__m256i>()) }
+}
+
+/// Pushes the first `count ≤ 8` of eight entries.
+#[inline(always)]
+pub(super) fn push_eight<const N: usize>(
+    stack: &mut Stack<N>,
+    references: __m256i,
+    distances: __m256,
+    count: u32,
+) {
+    const {
+        assert!(
+            N >= 8,
+            "a push may write as many entries as a node has children"
+        )
+    };
+    let (reference, distance) = stack.top(8);
+    // SAFETY: AVX2 is available (file header). By the invariant of the stack (checked in builds
+    // with debug assertions) N ≥ 8 entries from the top on lie inside each array; unaligned stores
+    // ask for no alignment. They initialise eight entries, of which at most eight are counted in.
+    unsafe {
+        _mm256_storeu_si256(reference.cast::<__m256i>(), references);
+        _mm256_storeu_ps(distance, distances);
+        stack.grow(count);
+    }
+}
 
 impl super::build::Halves for F32x8 {
     #[inline(always)]

@@ -1,14 +1,22 @@
 //! Enters the kernels: one function per instruction set that carries the target features, into
 //! which the generic kernel is inlined whole. A helper that were not inlined would be compiled for
-//! the baseline and lose its speed without a sound; the benchmark `kernels` watches the ratio.
+//! the baseline and lose its speed without a sound; the benchmark `rays` watches the ratio.
 
 use wide::{f32x4, f32x8};
 
+use super::{
+    Isa, Lanes,
+    portable::{Halves, Pair},
+};
 #[cfg(target_arch = "x86_64")]
-use super::avx2;
-use super::{Isa, Lanes, portable::Pair};
-use crate::layout::tree::Tree;
-use crate::traverse::kernel::{self, Candidate, Count, RaySetup};
+use super::{avx2, avx512};
+use crate::{
+    layout::{tree::Tree, triangles::Block},
+    traverse::{
+        kernel::{self, Candidate, Count, RaySetup},
+        triangle::TriangleTest,
+    },
+};
 
 /// The lane types that serve nodes of `N` children under each instruction set.
 pub(crate) trait Width<const N: usize> {
@@ -17,6 +25,9 @@ pub(crate) trait Width<const N: usize> {
     /// AVX2 lanes.
     #[cfg(target_arch = "x86_64")]
     type Avx2: Lanes<N>;
+    /// AVX-512 lanes.
+    #[cfg(target_arch = "x86_64")]
+    type Avx512: Lanes<N>;
 }
 
 /// Names the widths that have kernels.
@@ -27,25 +38,39 @@ impl Width<2> for Widths {
     type Portable = Pair<f32x4>;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = Pair<avx2::F32x4>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = Pair<avx2::F32x4>;
 }
 
 impl Width<4> for Widths {
     type Portable = f32x4;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = avx2::F32x4;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x4;
 }
 
 impl Width<8> for Widths {
     type Portable = f32x8;
     #[cfg(target_arch = "x86_64")]
     type Avx2 = avx2::F32x8;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x8;
+}
+
+impl Width<16> for Widths {
+    type Portable = Halves<f32x8>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx2 = Halves<avx2::F32x8>;
+    #[cfg(target_arch = "x86_64")]
+    type Avx512 = avx512::F32x16;
 }
 
 /// The closest hit of a ray with a tree.
 #[inline]
-pub(crate) fn closest<const N: usize, const W: usize, C: Count>(
+pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
     isa: Isa,
-    tree: &Tree<N, W>,
+    tree: &Tree<N, W, B>,
     ray: &RaySetup,
     count: &mut C,
 ) -> Option<Candidate>
@@ -55,16 +80,21 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
-        Isa::Avx2 => unsafe { closest_avx2(tree, ray, count) },
-        _ => kernel::closest::<N, W, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, C>(tree, ray, count) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, for `Isa::Avx512`.
+        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, C>(tree, ray, count) },
+        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(
+            tree, ray, count,
+        ),
     }
 }
 
 /// Whether a ray hits anything in a tree.
 #[inline]
-pub(crate) fn any<const N: usize, const W: usize, C: Count>(
+pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
     isa: Isa,
-    tree: &Tree<N, W>,
+    tree: &Tree<N, W, B>,
     ray: &RaySetup,
     count: &mut C,
 ) -> bool
@@ -74,33 +104,60 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx2 => unsafe { any_avx2(tree, ray, count) },
-        _ => kernel::any::<N, W, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, C>(tree, ray, count) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, C>(tree, ray, count) },
+        _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
     }
 }
 
+/// The two entries of an instruction set.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-fn closest_avx2<const N: usize, const W: usize, C: Count>(
-    tree: &Tree<N, W>,
-    ray: &RaySetup,
-    count: &mut C,
-) -> Option<Candidate>
-where
-    Widths: Width<N>,
-{
-    kernel::closest::<N, W, <Widths as Width<N>>::Avx2, avx2::F32x4, C>(tree, ray, count)
+macro_rules! entries {
+    ($closest:ident, $any:ident, $lanes:ident, $features:literal) => {
+        #[target_feature(enable = $features)]
+        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+            tree: &Tree<N, W, B>,
+            ray: &RaySetup,
+            count: &mut C,
+        ) -> Option<Candidate>
+        where
+            Widths: Width<N>,
+        {
+            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
+                tree, ray, count,
+            )
+        }
+
+        #[target_feature(enable = $features)]
+        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+            tree: &Tree<N, W, B>,
+            ray: &RaySetup,
+            count: &mut C,
+        ) -> bool
+        where
+            Widths: Width<N>,
+        {
+            kernel::any::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
+                tree, ray, count,
+            )
+        }
+    };
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
-fn any_avx2<const N: usize, const W: usize, C: Count>(
-    tree: &Tree<N, W>,
-    ray: &RaySetup,
-    count: &mut C,
-) -> bool
-where
-    Widths: Width<N>,
-{
-    kernel::any::<N, W, <Widths as Width<N>>::Avx2, avx2::F32x4, C>(tree, ray, count)
-}
+entries!(
+    closest_avx2,
+    any_avx2,
+    Avx2,
+    "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
+);
+
+#[cfg(target_arch = "x86_64")]
+entries!(
+    closest_avx512,
+    any_avx512,
+    Avx512,
+    "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"
+);

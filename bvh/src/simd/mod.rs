@@ -1,9 +1,9 @@
 //! The SIMD room: the only place of this crate with `unsafe`.
 //!
 //! Four layers after BurntSushi/memchr: [`Lanes`] is the handful of operations that traversal
-//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`] and
-//! [`avx2`] are the two implementations; [`dispatch`] enters one kernel per instruction set, chosen
-//! once by [`Isa`].
+//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`], [`avx2`]
+//! and [`avx512`] are the implementations; [`dispatch`] enters one kernel per instruction set,
+//! chosen once by [`Isa`].
 //!
 //! Invariant: the operations of [`Lanes`] other than [`Lanes::mul_add`] round once each in the
 //! same way in every implementation, so that a triangle test gives the same bits everywhere.
@@ -11,6 +11,8 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
 pub(crate) mod build;
 pub(crate) mod dispatch;
 pub(crate) mod isa;
@@ -59,7 +61,13 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     /// `self`, in the order of the child numbers that `order` holds in fields of
     /// `log2(N)` bits, lowest field first.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; N], order: u32, stack: &mut stack::Stack) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; N],
+        order: u64,
+        stack: &mut stack::Stack<N>,
+    ) {
         let distances = self.store();
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
@@ -67,4 +75,23 @@ pub(crate) trait Lanes<const N: usize>: Copy {
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
     }
+}
+
+/// Each of three values in every lane.
+#[inline(always)]
+pub(crate) fn splat_all<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
+    [L::splat(x), L::splat(y), L::splat(z)]
+}
+
+/// Asks for a cache line before it is needed; does nothing where there is no such instruction.
+#[inline(always)]
+pub(crate) fn prefetch<T>(item: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: SSE is part of x86-64; a prefetch reads nothing that the program can see.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(item).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = item;
 }

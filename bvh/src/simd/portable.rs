@@ -2,7 +2,7 @@
 
 use wide::{f32x4, f32x8};
 
-use super::Lanes;
+use super::{Lanes, stack::Stack};
 
 macro_rules! lanes_by_wide {
     ($wide:ty, $n:literal) => {
@@ -143,5 +143,116 @@ impl<L: Lanes<4>> Lanes<2> for Pair<L> {
     #[inline(always)]
     fn bits(mask: Self::Mask) -> u32 {
         L::bits(mask) & 3
+    }
+}
+
+/// Sixteen lanes in two halves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Halves<L>(pub L, pub L);
+
+/// Eight lanes that can be half of sixteen.
+pub(crate) trait Half: Lanes<8> {
+    /// [`Lanes::push_children`] of both halves.
+    #[inline(always)]
+    fn push_children_of_both(
+        both: Halves<Self>,
+        mask: u32,
+        children: &[u32; 16],
+        order: u64,
+        stack: &mut Stack<16>,
+    ) {
+        let distances = both.store();
+        for k in 0..16 {
+            let slot = (order >> (4 * k)) as usize & 15;
+            stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
+        }
+    }
+}
+
+impl Half for f32x8 {}
+
+/// A comparison of sixteen lanes in two halves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaskHalves<M>(M, M);
+
+impl<M: std::ops::BitAnd<Output = M>> std::ops::BitAnd for MaskHalves<M> {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0, self.1 & other.1)
+    }
+}
+
+impl<L: Half> Lanes<16> for Halves<L> {
+    type Mask = MaskHalves<L::Mask>;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(L::splat(value), L::splat(value))
+    }
+    #[inline(always)]
+    fn load(array: &[f32; 16]) -> Self {
+        let (halves, _) = array.as_chunks();
+        Self(L::load(&halves[0]), L::load(&halves[1]))
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 16] {
+        let (low, high) = (self.0.store(), self.1.store());
+        std::array::from_fn(|i| if i < 8 { low[i] } else { high[i - 8] })
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0.add(other.0), self.1.add(other.1))
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.sub(other.0), self.1.sub(other.1))
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0.mul(other.0), self.1.mul(other.1))
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0.div(other.0), self.1.div(other.1))
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Self(
+            self.0.mul_add(factor.0, addend.0),
+            self.1.mul_add(factor.1, addend.1),
+        )
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0), self.1.min(other.1))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0), self.1.max(other.1))
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn xor_sign(self, sign: Self) -> Self {
+        Self(self.0.xor_sign(sign.0), self.1.xor_sign(sign.1))
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> Self::Mask {
+        MaskHalves(self.0.le(other.0), self.1.le(other.1))
+    }
+    #[inline(always)]
+    fn is_nonzero(self) -> Self::Mask {
+        MaskHalves(self.0.is_nonzero(), self.1.is_nonzero())
+    }
+    #[inline(always)]
+    fn bits(mask: Self::Mask) -> u32 {
+        L::bits(mask.0) | L::bits(mask.1) << 8
+    }
+    #[inline(always)]
+    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
+        L::push_children_of_both(self, mask, children, order, stack);
     }
 }

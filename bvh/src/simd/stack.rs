@@ -1,30 +1,33 @@
 //! The stack of one traversal: child references and their entry distances in two arrays, so that
-//! eight can be written by one store each. It is not initialised: clearing it would cost as much
-//! as tracing a short ray.
+//! a register full can be written by one store each. It is not initialised: clearing it would cost
+//! as much as tracing a short ray.
 //!
-//! Invariant: `top ≤ CAPACITY − 8`, and all entries below `top` are initialised. The deepest tree
-//! has [`MAX_LEVELS`] levels and the widest node 8 children of which one is taken at once, so that
-//! at most 7 wait per level; [`CAPACITY`] is that, and 8 more for a store that writes past the top.
+//! Invariant: `top ≤ CAPACITY − N` before a push of up to N entries, and all entries below `top`
+//! are initialised. A tree has at most [`MAX_LEVELS`] levels (emission asserts it), so that at most
+//! MAX_LEVELS − 1 nodes lie on a path. Each leaves at most N − 1 of its N children waiting, hence
+//! the last of them finds at most (N − 1)(MAX_LEVELS − 2) entries and room for N more.
 
 use std::mem::MaybeUninit;
 
 /// Levels of the deepest tree that `max_depth` allows.
 pub(crate) const MAX_LEVELS: usize = 64;
-const CAPACITY: usize = 7 * MAX_LEVELS + 1 + 8;
 
+/// The stack for nodes of `N` children. The arrays are used as flat ones.
 #[derive(Debug)]
-pub(crate) struct Stack {
-    references: [MaybeUninit<u32>; CAPACITY],
-    distances: [MaybeUninit<f32>; CAPACITY],
+pub(crate) struct Stack<const N: usize> {
+    references: [[MaybeUninit<u32>; N]; MAX_LEVELS - 1],
+    distances: [[MaybeUninit<f32>; N]; MAX_LEVELS - 1],
     top: usize,
 }
 
-impl Stack {
+impl<const N: usize> Stack<N> {
+    const CAPACITY: usize = N * (MAX_LEVELS - 1);
+
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self {
-            references: [const { MaybeUninit::uninit() }; CAPACITY],
-            distances: [const { MaybeUninit::uninit() }; CAPACITY],
+            references: [const { [const { MaybeUninit::uninit() }; N] }; MAX_LEVELS - 1],
+            distances: [const { [const { MaybeUninit::uninit() }; N] }; MAX_LEVELS - 1],
             top: 0,
         }
     }
@@ -32,38 +35,40 @@ impl Stack {
     /// Pushes an entry if `bit` is 1, without a branch; `bit` is 0 or 1.
     #[inline(always)]
     pub(crate) fn push_if(&mut self, bit: u32, reference: u32, distance: f32) {
-        debug_assert!(self.top < CAPACITY - 7);
+        debug_assert!(self.top < Self::CAPACITY);
         // The index is in bounds by the invariant; min() lets the compiler see it for free.
-        let at = self.top.min(CAPACITY - 1);
-        self.references[at] = MaybeUninit::new(reference);
-        self.distances[at] = MaybeUninit::new(distance);
+        let at = self.top.min(Self::CAPACITY - 1);
+        self.references.as_flattened_mut()[at] = MaybeUninit::new(reference);
+        self.distances.as_flattened_mut()[at] = MaybeUninit::new(distance);
         self.top += bit as usize;
     }
 
-    /// Pushes the first `count` of eight entries.
+    /// Where the next entries go.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
-    pub(crate) fn push_eight(
-        &mut self,
-        references: std::arch::x86_64::__m256i,
-        distances: std::arch::x86_64::__m256i,
-        count: u32,
-    ) {
-        use std::arch::x86_64::{__m256i, _mm256_storeu_si256};
-        debug_assert!(self.top <= CAPACITY - 8);
-        // SAFETY: the caller holds AVX2 values, so AVX2 is available. `top ≤ CAPACITY − 8` by the
-        // invariant of the type (checked in builds with debug assertions), so that eight elements
-        // from `top` on lie inside each array; unaligned stores ask for no alignment.
-        unsafe {
-            _mm256_storeu_si256(
-                self.references.as_mut_ptr().add(self.top).cast::<__m256i>(),
-                references,
-            );
-            _mm256_storeu_si256(
-                self.distances.as_mut_ptr().add(self.top).cast::<__m256i>(),
-                distances,
-            );
-        }
+    pub(super) fn top(&mut self, lanes: usize) -> (*mut u32, *mut f32) {
+        debug_assert!(self.top + lanes <= Self::CAPACITY);
+        (
+            self.references
+                .as_flattened_mut()
+                .as_mut_ptr()
+                .cast::<u32>()
+                .wrapping_add(self.top),
+            self.distances
+                .as_flattened_mut()
+                .as_mut_ptr()
+                .cast::<f32>()
+                .wrapping_add(self.top),
+        )
+    }
+
+    /// Counts in `count` entries that were written at [`Stack::top`].
+    ///
+    /// # Safety
+    /// So many entries of both arrays were initialised there.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(super) unsafe fn grow(&mut self, count: u32) {
         self.top += count as usize;
     }
 
@@ -71,14 +76,13 @@ impl Stack {
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<(u32, f32)> {
         self.top = self.top.checked_sub(1)?;
-        let at = self.top.min(CAPACITY - 1);
-        // SAFETY: entries below the old `top` are initialised by the invariant: both push
-        // functions write an entry before they raise `top` past it.
-        unsafe {
-            Some((
-                self.references[at].assume_init(),
-                self.distances[at].assume_init(),
-            ))
-        }
+        let at = self.top.min(Self::CAPACITY - 1);
+        let (references, distances) = (
+            self.references.as_flattened(),
+            self.distances.as_flattened(),
+        );
+        // SAFETY: entries below the old `top` are initialised by the invariant: `top` is raised
+        // only past entries that have been written.
+        unsafe { Some((references[at].assume_init(), distances[at].assume_init())) }
     }
 }

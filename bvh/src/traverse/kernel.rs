@@ -1,4 +1,4 @@
-//! Traversal of a tree by one ray, generic over node width and lanes.
+//! Traversal of a tree by one ray, generic over node width, triangle test and lanes.
 //!
 //! Boxes are tested by slabs (Kay, Kajiya, *Ray Tracing Complex Scenes*, 1986) with one
 //! multiplication and addition per plane; rounding is paid for by one pad per ray and axis, added
@@ -8,17 +8,22 @@
 //! Invariants: no node is passed by whose triangles the slow twin would hit at or before the best
 //! distance (so a popped entry is dropped only if it starts strictly behind it); equal distances
 //! are decided by the lowest id. Together they make the hit a function of ray and triangles alone.
+//!
+//! No operation on lanes stands in a closure, here and in the triangle tests: unlike a function that
+//! is always inlined, a closure may be compiled by itself, without the instruction set of the
+//! kernel, and then each operation becomes a call (seen: 7 times slower).
 
 use glam::Vec3;
 
-use super::triangle::{BlockHits, NODE_PAD, RayLanes, TRIANGLE_PAD};
+use super::triangle::{BlockHits, NODE_PAD, TriangleTest};
 use crate::{
     layout::{
         node::{ChildRef, Node},
         tree::Tree,
+        triangles::Block,
     },
     ray::{Ray, Work},
-    simd::{Lanes, stack::Stack},
+    simd::{Lanes, splat_all, stack::Stack},
 };
 
 /// Bound S of the magnitude of scaled coordinates.
@@ -38,7 +43,8 @@ pub(crate) struct RaySetup {
     /// Scaled by a power of two so that the largest magnitude lies in 1/2..2.
     pub(crate) direction: [f32; 3],
     pub(crate) reciprocal: [f32; 3],
-    pub(crate) triangle_pad: [f32; 3],
+    /// (S + |origin|) · |reciprocal|: errors of distances are multiples of it.
+    pub(crate) margin: [f32; 3],
     pub(crate) t_min: f32,
     pub(crate) t_max: f32,
     octant: usize,
@@ -76,7 +82,7 @@ impl RaySetup {
             }
             .recip()
         });
-        let margin: [f32; 3] = std::array::from_fn(|axis| {
+        let margin = std::array::from_fn(|axis| {
             (COORDINATE_BOUND + origin[axis].abs()) * reciprocal[axis].abs()
         });
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
@@ -86,7 +92,7 @@ impl RaySetup {
             origin: origin.to_array(),
             direction: direction.to_array(),
             reciprocal,
-            triangle_pad: margin.map(|m| m * TRIANGLE_PAD),
+            margin,
             t_min: scaled(t_min),
             t_max: scaled(ray.t_max),
             octant: (0..3)
@@ -170,19 +176,43 @@ struct BoxLanes<L> {
 
 impl<L> BoxLanes<L> {
     #[inline(always)]
-    fn new<const N: usize>(ray: &RaySetup) -> Self
+    fn new<const N: usize>(ray: &RaySetup, margin: [f32; 3]) -> Self
     where
         L: Lanes<N>,
     {
-        let pad: [f32; 3] = ray.triangle_pad.map(|pad| pad * (NODE_PAD / TRIANGLE_PAD));
-        let offset: [f32; 3] = std::array::from_fn(|axis| -ray.origin[axis] * ray.reciprocal[axis]);
+        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
+        for axis in 0..3 {
+            let offset = -ray.origin[axis] * ray.reciprocal[axis];
+            let pad = margin[axis] * NODE_PAD;
+            near_addend[axis] = offset - pad;
+            far_addend[axis] = offset + pad;
+            near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
+        }
         Self {
-            reciprocal: ray.reciprocal.map(L::splat),
-            near_addend: std::array::from_fn(|axis| L::splat(offset[axis] - pad[axis])),
-            far_addend: std::array::from_fn(|axis| L::splat(offset[axis] + pad[axis])),
-            near_plane: std::array::from_fn(|axis| 2 * axis + (ray.octant >> axis & 1)),
+            reciprocal: splat_all(ray.reciprocal),
+            near_addend: splat_all(near_addend),
+            far_addend: splat_all(far_addend),
+            near_plane,
             t_min: L::splat(ray.t_min),
         }
+    }
+
+    #[inline(always)]
+    fn near<const N: usize, const W: usize>(&self, node: &Node<N, W>, axis: usize) -> L
+    where
+        L: Lanes<N>,
+    {
+        L::load(&node.planes[self.near_plane[axis]])
+            .mul_add(self.reciprocal[axis], self.near_addend[axis])
+    }
+
+    #[inline(always)]
+    fn far<const N: usize, const W: usize>(&self, node: &Node<N, W>, axis: usize) -> L
+    where
+        L: Lanes<N>,
+    {
+        L::load(&node.planes[self.near_plane[axis] ^ 1])
+            .mul_add(self.reciprocal[axis], self.far_addend[axis])
     }
 
     /// Distances at which the boxes of a node are entered, and one bit per box that is.
@@ -191,16 +221,10 @@ impl<L> BoxLanes<L> {
     where
         L: Lanes<N>,
     {
-        let near = |axis: usize| {
-            L::load(&node.planes[self.near_plane[axis]])
-                .mul_add(self.reciprocal[axis], self.near_addend[axis])
-        };
-        let far = |axis: usize| {
-            L::load(&node.planes[self.near_plane[axis] ^ 1])
-                .mul_add(self.reciprocal[axis], self.far_addend[axis])
-        };
-        let enter = near(0).max(near(1)).max(near(2).max(self.t_min));
-        let leave = far(0).min(far(1)).min(far(2).min(L::splat(t_max)));
+        let enter = self.near(node, 0).max(self.near(node, 1));
+        let enter = enter.max(self.near(node, 2).max(self.t_min));
+        let leave = self.far(node, 0).min(self.far(node, 1));
+        let leave = leave.min(self.far(node, 2).min(L::splat(t_max)));
         (enter, L::bits(enter.le(leave)))
     }
 }
@@ -211,13 +235,13 @@ impl<L> BoxLanes<L> {
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
 #[inline(always)]
-fn descend<const N: usize, const W: usize, L: Lanes<N>, C: Count>(
-    tree: &Tree<N, W>,
+fn descend<const N: usize, const W: usize, B, L: Lanes<N>, C: Count>(
+    tree: &Tree<N, W, B>,
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
     t_max: f32,
-    order: impl Fn(&Node<N, W>) -> u32,
-    stack: &mut Stack,
+    order: impl Fn(&Node<N, W>) -> u64,
+    stack: &mut Stack<N>,
     count: &mut C,
 ) -> Option<ChildRef> {
     while !reference.is_leaf() {
@@ -238,13 +262,21 @@ fn descend<const N: usize, const W: usize, L: Lanes<N>, C: Count>(
 
 /// The closest hit, equal distances decided by the lowest id.
 #[inline(always)]
-pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: Count>(
-    tree: &Tree<N, W>,
+pub(crate) fn closest<
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: Lanes<N>,
+    T: Lanes<4>,
+    C: Count,
+>(
+    tree: &Tree<N, W, B>,
     ray: &RaySetup,
     count: &mut C,
 ) -> Option<Candidate> {
-    let boxes = BoxLanes::<L>::new(ray);
-    let triangles = RayLanes::<T>::new(ray);
+    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let prepared = A::prepare::<T>(ray);
     let mut best = Best {
         t: ray.t_max,
         u: 0.0,
@@ -252,7 +284,7 @@ pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, 
         den: 1.0,
         id: u32::MAX,
     };
-    let mut stack = Stack::new();
+    let mut stack = Stack::<N>::new();
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,
@@ -276,9 +308,9 @@ pub(crate) fn closest<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, 
         };
         for block in &tree.blocks[leaf.blocks()] {
             count.block();
-            let hits = triangles.test(ray, block, best.t);
+            let hits = A::test(ray, &prepared, block, &tree.points, best.t);
             if hits.mask != 0 {
-                best.keep_first(&hits, &block.id);
+                best.keep_first(&hits, block.ids());
             }
         }
     }
@@ -335,14 +367,22 @@ pub(crate) fn precedes((t, id): (f32, u32), (other_t, other_id): (f32, u32)) -> 
 
 /// Whether anything is hit.
 #[inline(always)]
-pub(crate) fn any<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: Count>(
-    tree: &Tree<N, W>,
+pub(crate) fn any<
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: Lanes<N>,
+    T: Lanes<4>,
+    C: Count,
+>(
+    tree: &Tree<N, W, B>,
     ray: &RaySetup,
     count: &mut C,
 ) -> bool {
-    let boxes = BoxLanes::<L>::new(ray);
-    let triangles = RayLanes::<T>::new(ray);
-    let mut stack = Stack::new();
+    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let prepared = A::prepare::<T>(ray);
+    let mut stack = Stack::<N>::new();
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,
@@ -363,7 +403,7 @@ pub(crate) fn any<const N: usize, const W: usize, L: Lanes<N>, T: Lanes<4>, C: C
         };
         for block in &tree.blocks[leaf.blocks()] {
             count.block();
-            if triangles.test(ray, block, ray.t_max).mask != 0 {
+            if A::test(ray, &prepared, block, &tree.points, ray.t_max).mask != 0 {
                 return true;
             }
         }

@@ -1,5 +1,7 @@
-//! From rays to hits: the kernels, the triangle test, and the slow twin that both answer to.
+//! From rays to hits: the kernels, the triangle tests, and the slow twin that both answer to.
 
+pub(crate) mod fast;
 pub(crate) mod kernel;
 pub mod reference;
+pub(crate) mod robust;
 pub(crate) mod triangle;

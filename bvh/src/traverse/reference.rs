@@ -5,20 +5,30 @@ use glam::Vec3;
 
 use super::{
     kernel::{Candidate, RaySetup, precedes},
+    robust::{SMALL_EDGE_VALUE, axes_of, in_f64, margin_of},
     triangle::UNIT_ROUNDOFF,
 };
 use crate::{
+    Accuracy,
     bvh::{bounds_of, first_ids, hit_of, scale_of},
     error::BuildError,
     mesh::TriangleMesh,
     ray::{Hit, Ray},
 };
 
-/// The closest hit of a ray with meshes, by testing every triangle.
+/// The closest hit of a ray with meshes, by testing every triangle by the test of `accuracy`.
 ///
 /// # Errors
 /// As [`Bvh::build`](crate::Bvh::build), for the same meshes.
-pub fn closest_hit(meshes: &[&TriangleMesh], ray: &Ray) -> Result<Option<Hit>, BuildError> {
+pub fn closest_hit(
+    meshes: &[&TriangleMesh],
+    ray: &Ray,
+    accuracy: Accuracy,
+) -> Result<Option<Hit>, BuildError> {
+    let triangle = match accuracy {
+        Accuracy::Fast => fast_triangle,
+        Accuracy::Robust => robust_triangle,
+    };
     let first_ids = first_ids(meshes)?;
     let scale = scale_of(&bounds_of(meshes))?;
     let Some(setup) = RaySetup::new(ray, scale) else {
@@ -46,7 +56,7 @@ pub fn closest_hit(meshes: &[&TriangleMesh], ray: &Ray) -> Result<Option<Hit>, B
 }
 
 /// Distance and weights of vertices 1 and 2 where the ray meets a triangle.
-fn triangle(ray: &RaySetup, [v0, v1, v2]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
+fn fast_triangle(ray: &RaySetup, [v0, v1, v2]: [Vec3; 3]) -> Option<(f32, f32, f32)> {
     let origin = Vec3::from(ray.origin);
     let direction = Vec3::from(ray.direction);
     let (edge_1, edge_2) = (v0 - v1, v2 - v0);
@@ -60,24 +70,52 @@ fn triangle(ray: &RaySetup, [v0, v1, v2]: [Vec3; 3]) -> Option<(f32, f32, f32)> 
         return None;
     }
     let t = flip(dot(normal, to_vertex)) / den.abs();
+    let t = in_box(ray, [v0, v0 - edge_1, v0 + edge_2], ray.margin, t)?;
+    Some((t, u / den.abs(), v / den.abs()))
+}
 
-    // The interval in which the ray is inside the triangle's box, widened by 8 roundoffs.
+/// The same by the robust test.
+fn robust_triangle(ray: &RaySetup, corners: [Vec3; 3]) -> Option<(f32, f32, f32)> {
+    let [x, y, z] = axes_of(ray.direction);
+    let d = ray.direction;
+    let (shear_x, shear_y) = (d[x] / d[z], d[y] / d[z]);
+    let sheared = corners.map(|vertex| {
+        let to = |axis: usize| vertex[axis] - ray.origin[axis];
+        [to(x) - shear_x * to(z), to(y) - shear_y * to(z), to(z)]
+    });
+    let [a, b, c] = sheared;
+    let edge = |p: [f32; 3], q: [f32; 3]| p[0] * q[1] - p[1] * q[0];
+    let values = [edge(c, b), edge(a, c), edge(b, a)];
+    if values.iter().any(|&value| value < 0.0) && values.iter().any(|&value| value > 0.0) {
+        return None;
+    }
+    let [t, weight_b, weight_c] = if values.iter().any(|v| v.abs() <= SMALL_EDGE_VALUE) {
+        in_f64(sheared, d[z])?
+    } else {
+        let [u, v, w] = values;
+        let den = u + v + w;
+        let (weight_b, weight_c) = (v / den, w / den);
+        let to = a[2] + weight_b * (b[2] - a[2]) + weight_c * (c[2] - a[2]);
+        [to / d[z], weight_b, weight_c]
+    };
+    let t = in_box(ray, corners, margin_of(ray, z), t)?;
+    Some((t, weight_b, weight_c))
+}
+
+/// The distance, clamped to the interval in which the ray is inside the triangle's box, widened by
+/// 8 roundoffs; `None` if it is empty or the distance is outside the ray's.
+fn in_box(ray: &RaySetup, [a, b, c]: [Vec3; 3], margin: [f32; 3], t: f32) -> Option<f32> {
     let (mut enter, mut leave) = (f32::NEG_INFINITY, f32::INFINITY);
     for axis in 0..3 {
-        let (a, b, c) = (v0[axis], v0[axis] - edge_1[axis], v0[axis] + edge_2[axis]);
+        let (a, b, c) = (a[axis], b[axis], c[axis]);
         let at = |plane: f32| (plane - ray.origin[axis]) * ray.reciprocal[axis];
         let (low, high) = (at(a.min(b).min(c)), at(a.max(b).max(c)));
-        let pad =
-            (2.0 + ray.origin[axis].abs()) * ray.reciprocal[axis].abs() * (8.0 * UNIT_ROUNDOFF);
+        let pad = margin[axis] * (8.0 * UNIT_ROUNDOFF);
         enter = enter.max(low.min(high) - pad);
         leave = leave.min(low.max(high) + pad);
     }
     let t = t.max(enter).min(leave);
-    (enter <= leave && ray.t_min <= t && t <= ray.t_max).then_some((
-        t,
-        u / den.abs(),
-        v / den.abs(),
-    ))
+    (enter <= leave && ray.t_min <= t && t <= ray.t_max).then_some(t)
 }
 
 fn cross(a: Vec3, b: Vec3) -> Vec3 {

@@ -1,0 +1,127 @@
+//! A tree of any width and leaf format, and the triangle test that goes with it: the one place
+//! where parameters become types.
+
+use crate::{
+    error::BuildError,
+    layout::{
+        emit::Source,
+        tree::Tree,
+        triangles::{CornerBlock, EdgeBlock, IndexBlock},
+    },
+    params::{Accuracy, BuildParams, LeafFormat},
+    simd::{
+        Isa,
+        dispatch::{self, Width, Widths},
+    },
+    stats::TreeStats,
+    traverse::{
+        fast::Fast,
+        kernel::{Candidate, Count, RaySetup},
+        robust::Robust,
+    },
+};
+
+/// A tree whose nodes are as wide in memory as the smallest width that holds its children.
+#[derive(Clone, Debug)]
+pub(crate) enum AnyTree {
+    Two(Formatted<2, 2>),
+    Four(Formatted<4, 2>),
+    Eight(Formatted<8, 8>),
+    Sixteen(Formatted<16, 16>),
+}
+
+/// A tree whose leaves are in the format of its triangle test.
+#[derive(Clone, Debug)]
+pub(crate) enum Formatted<const N: usize, const W: usize> {
+    Fast(Tree<N, W, EdgeBlock>),
+    Robust(Tree<N, W, CornerBlock>),
+    CompactFast(Tree<N, W, IndexBlock>),
+    CompactRobust(Tree<N, W, IndexBlock>),
+}
+
+/// Evaluates an expression for the tree of any width.
+macro_rules! for_width {
+    ($any:expr, $tree:ident => $result:expr) => {
+        match $any {
+            AnyTree::Two($tree) => $result,
+            AnyTree::Four($tree) => $result,
+            AnyTree::Eight($tree) => $result,
+            AnyTree::Sixteen($tree) => $result,
+        }
+    };
+}
+
+impl AnyTree {
+    /// The tree of a build.
+    pub(crate) fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+        Ok(match params.branching_factor {
+            ..=2 => Self::Two(Formatted::new(source, params)?),
+            3..=4 => Self::Four(Formatted::new(source, params)?),
+            5..=8 => Self::Eight(Formatted::new(source, params)?),
+            _ => Self::Sixteen(Formatted::new(source, params)?),
+        })
+    }
+
+    pub(crate) fn stats(&self, params: &BuildParams) -> TreeStats {
+        for_width!(self, tree => tree.stats(params))
+    }
+
+    #[inline]
+    pub(crate) fn closest<C: Count>(
+        &self,
+        isa: Isa,
+        ray: &RaySetup,
+        count: &mut C,
+    ) -> Option<Candidate> {
+        for_width!(self, tree => tree.closest(isa, ray, count))
+    }
+
+    #[inline]
+    pub(crate) fn any<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> bool {
+        for_width!(self, tree => tree.any(isa, ray, count))
+    }
+}
+
+impl<const N: usize, const W: usize> Formatted<N, W>
+where
+    Widths: Width<N>,
+{
+    fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+        Ok(match (params.leaf_format, params.accuracy) {
+            (LeafFormat::Edges, Accuracy::Fast) => Self::Fast(source.emit()?),
+            (LeafFormat::Edges, Accuracy::Robust) => Self::Robust(source.emit()?),
+            (LeafFormat::Compact, Accuracy::Fast) => Self::CompactFast(source.emit()?),
+            (LeafFormat::Compact, Accuracy::Robust) => Self::CompactRobust(source.emit()?),
+        })
+    }
+
+    fn stats(&self, params: &BuildParams) -> TreeStats {
+        match self {
+            Self::Fast(tree) => TreeStats::of(tree, params),
+            Self::Robust(tree) => TreeStats::of(tree, params),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => TreeStats::of(tree, params),
+        }
+    }
+
+    #[inline]
+    fn closest<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> Option<Candidate> {
+        use dispatch::closest;
+        match self {
+            Self::Fast(tree) => closest::<N, W, _, Fast, C>(isa, tree, ray, count),
+            Self::Robust(tree) => closest::<N, W, _, Robust, C>(isa, tree, ray, count),
+            Self::CompactFast(tree) => closest::<N, W, _, Fast, C>(isa, tree, ray, count),
+            Self::CompactRobust(tree) => closest::<N, W, _, Robust, C>(isa, tree, ray, count),
+        }
+    }
+
+    #[inline]
+    fn any<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> bool {
+        use dispatch::any;
+        match self {
+            Self::Fast(tree) => any::<N, W, _, Fast, C>(isa, tree, ray, count),
+            Self::Robust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
+            Self::CompactFast(tree) => any::<N, W, _, Fast, C>(isa, tree, ray, count),
+            Self::CompactRobust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
+        }
+    }
+}
