@@ -4,6 +4,7 @@
 //! Run: `cargo bench -p raywright-benches --bench rays [--features peers]`
 
 use raywright_benches::{
+    goals::Goals,
     rays::{RaySet, ray_sets},
     turns::measure,
 };
@@ -129,34 +130,6 @@ fn table(scene: &str, set: &RaySet, engines: &[Engine], tree: &Bvh, goals: &mut 
             let what = format!("{scene}, {}: {fast} is not slower than {slow}", set.name);
             goals.check(what, fast_speed >= slow_speed * 0.97);
         }
-    }
-}
-
-#[derive(Default)]
-struct Goals {
-    met: usize,
-    missed: Vec<String>,
-}
-
-impl Goals {
-    fn check(&mut self, what: String, met: bool) {
-        if met {
-            self.met += 1
-        } else {
-            self.missed.push(what)
-        }
-    }
-
-    fn print(&self) {
-        println!();
-        for missed in &self.missed {
-            println!("missed: {missed}");
-        }
-        println!(
-            "goals: {} of {} met",
-            self.met,
-            self.met + self.missed.len()
-        );
     }
 }
 
