@@ -90,6 +90,10 @@ impl Record {
         first..first + self.count as usize
     }
 
+    pub(crate) fn is_leaf(&self) -> bool {
+        self.kind == Kind::Leaf
+    }
+
     pub(crate) fn bounds(&self) -> Aabb {
         Aabb {
             min: self.lower.into(),
