@@ -6,14 +6,14 @@ use crate::{
     layout::{
         emit::Source,
         tree::Tree,
-        triangles::{CornerBlock, EdgeBlock, IndexBlock},
+        triangles::{CornerBlock, EdgeBlock, IndexBlock, Triangles},
     },
     params::{Accuracy, BuildParams, LeafFormat},
     simd::{
         Isa,
         dispatch::{self, Width, Widths},
     },
-    stats::TreeStats,
+    stats::{TreeStats, sah_cost},
     traverse::{
         fast::Fast,
         kernel::{Candidate, Count, RaySetup},
@@ -66,6 +66,15 @@ impl AnyTree {
         for_width!(self, tree => tree.stats(params))
     }
 
+    pub(crate) fn sah_cost(&self, params: &BuildParams) -> f64 {
+        for_width!(self, tree => tree.sah_cost(params))
+    }
+
+    /// Moves the tree to other vertices of the same triangles.
+    pub(crate) fn refit(&mut self, triangles: &Triangles<'_>) {
+        for_width!(self, tree => tree.refit(triangles));
+    }
+
     #[inline]
     pub(crate) fn closest<C: Count>(
         &self,
@@ -100,6 +109,22 @@ where
             Self::Fast(tree) => TreeStats::of(tree, params),
             Self::Robust(tree) => TreeStats::of(tree, params),
             Self::CompactFast(tree) | Self::CompactRobust(tree) => TreeStats::of(tree, params),
+        }
+    }
+
+    fn sah_cost(&self, params: &BuildParams) -> f64 {
+        match self {
+            Self::Fast(tree) => sah_cost(tree, params),
+            Self::Robust(tree) => sah_cost(tree, params),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => sah_cost(tree, params),
+        }
+    }
+
+    fn refit(&mut self, triangles: &Triangles<'_>) {
+        match self {
+            Self::Fast(tree) => tree.refit(triangles),
+            Self::Robust(tree) => tree.refit(triangles),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => tree.refit(triangles),
         }
     }
 

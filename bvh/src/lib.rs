@@ -32,8 +32,8 @@ mod traverse;
 
 pub use bounds::Aabb;
 pub use build::{BuildWorkspace, LeafReference};
-pub use bvh::Bvh;
-pub use error::{BuildError, ParameterFault};
+pub use bvh::{Bvh, Refit};
+pub use error::{BuildError, ParameterFault, RefitError};
 pub use glam::Vec3;
 pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
 pub use mesh::{MeshError, TriangleMesh};

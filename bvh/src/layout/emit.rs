@@ -4,7 +4,7 @@
 //! many nodes and blocks it needs, so that threads fill disjoint slices.
 
 use super::{
-    node::{ChildRef, Node, ranks},
+    node::{ChildRef, Node, half_area, ranks},
     tree::Tree,
     triangles::{BLOCK_SIZE, Block, Triangles},
 };
@@ -215,11 +215,6 @@ fn check_count(parts: &'static str, count: usize, limit: usize) -> Result<(), Bu
             limit,
         })
     }
-}
-
-fn half_area(bounds: &Aabb) -> f32 {
-    let d = bounds.max - bounds.min;
-    d.x * (d.y + d.z) + d.y * d.z
 }
 
 #[cfg(test)]

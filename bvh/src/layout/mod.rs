@@ -2,5 +2,6 @@
 
 pub(crate) mod emit;
 pub(crate) mod node;
+mod refit;
 pub(crate) mod tree;
 pub(crate) mod triangles;

@@ -49,8 +49,14 @@ impl Triangles<'_> {
         self.first_ids[leaf.geometry_id as usize] + leaf.primitive_id
     }
 
+    /// The triangle with a number over all meshes.
     #[inline]
-    fn corners(&self, leaf: LeafReference) -> [Vec3; 3] {
+    pub(crate) fn locate(&self, id: u32) -> LeafReference {
+        locate(self.first_ids, id)
+    }
+
+    #[inline]
+    pub(crate) fn corners(&self, leaf: LeafReference) -> [Vec3; 3] {
         let mesh = self.meshes[leaf.geometry_id as usize];
         mesh.corners(leaf.primitive_id).map(|v| v * self.scale)
     }
@@ -88,6 +94,17 @@ impl Triangles<'_> {
     /// The number of the point of the unused lanes.
     fn unused_point(&self) -> u32 {
         self.first_points.last().copied().unwrap_or(0)
+    }
+}
+
+/// Geometry id and primitive id of a triangle, by its number over all meshes.
+#[inline]
+pub(crate) fn locate(first_ids: &[u32], id: u32) -> LeafReference {
+    // The last mesh that begins at or before it: empty meshes begin where the next one does.
+    let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
+    LeafReference {
+        geometry_id: geometry_id as u32,
+        primitive_id: id - first_ids[geometry_id],
     }
 }
 
