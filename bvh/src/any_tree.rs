@@ -43,17 +43,21 @@ pub(crate) enum Formatted<const N: usize, const W: usize> {
 macro_rules! for_width {
     ($any:expr, $tree:ident => $result:expr) => {
         match $any {
-            AnyTree::Two($tree) => $result,
-            AnyTree::Four($tree) => $result,
-            AnyTree::Eight($tree) => $result,
-            AnyTree::Sixteen($tree) => $result,
+            Self::Two($tree) => $result,
+            Self::Four($tree) => $result,
+            Self::Eight($tree) => $result,
+            Self::Sixteen($tree) => $result,
         }
     };
 }
+pub(crate) use for_width;
 
 impl AnyTree {
     /// The tree of a build.
-    pub(crate) fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+    pub(crate) fn new(
+        source: &Source<'_, Triangles<'_>>,
+        params: &BuildParams,
+    ) -> Result<Self, BuildError> {
         Ok(match params.branching_factor {
             ..=2 => Self::Two(Formatted::new(source, params)?),
             3..=4 => Self::Four(Formatted::new(source, params)?),
@@ -95,7 +99,7 @@ impl<const N: usize, const W: usize> Formatted<N, W>
 where
     Widths: Width<N>,
 {
-    fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+    fn new(source: &Source<'_, Triangles<'_>>, params: &BuildParams) -> Result<Self, BuildError> {
         Ok(match (params.leaf_format, params.accuracy) {
             (LeafFormat::Edges, Accuracy::Fast) => Self::Fast(source.emit()?),
             (LeafFormat::Edges, Accuracy::Robust) => Self::Robust(source.emit()?),

@@ -116,7 +116,7 @@ impl Bvh {
             root,
             records: &workspace.records,
             leaves: &workspace.leaves,
-            triangles: Triangles {
+            primitives: Triangles {
                 meshes,
                 first_ids: &first_ids,
                 first_points: &first_points(meshes)?,

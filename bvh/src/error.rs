@@ -93,6 +93,12 @@ pub enum BuildError {
         /// The largest number allowed.
         limit: usize,
     },
+    /// A box that is empty or not finite, where boxes are the primitives.
+    #[error("box {index} is empty or not finite")]
+    InvalidBox {
+        /// Number of the box, from 0.
+        index: usize,
+    },
     /// A mesh that cannot be numbered.
     #[error(transparent)]
     Mesh(#[from] MeshError),

@@ -17,6 +17,7 @@
 
 mod any_tree;
 mod bounds;
+mod boxes;
 mod build;
 mod bvh;
 mod error;
@@ -31,6 +32,7 @@ mod stats;
 mod traverse;
 
 pub use bounds::Aabb;
+pub use boxes::{BoxBvh, BoxHit, segments};
 pub use build::{BuildWorkspace, LeafReference};
 pub use bvh::{Bvh, Refit};
 pub use error::{BuildError, ParameterFault, RefitError};

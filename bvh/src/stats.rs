@@ -15,9 +15,9 @@ use crate::{
     bounds::Aabb,
     build::{LeafReference, record::Record},
     layout::{
+        block::{BLOCK_SIZE, Block},
         node::ChildRef,
         tree::Tree,
-        triangles::{BLOCK_SIZE, Block},
     },
     params::BuildParams,
 };

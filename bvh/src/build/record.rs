@@ -6,7 +6,7 @@
 //! record array from the start, and threads never meet.
 
 use super::primitive::Bounds;
-use crate::{bounds::Aabb, layout::triangles::BLOCK_SIZE};
+use crate::{bounds::Aabb, layout::block::BLOCK_SIZE};
 
 /// What is behind a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

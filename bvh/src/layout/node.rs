@@ -184,7 +184,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::layout::triangles::BLOCK_SIZE;
+    use crate::layout::block::BLOCK_SIZE;
 
     #[test]
     fn sizes_are_whole_cache_lines() {

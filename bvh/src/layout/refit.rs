@@ -10,9 +10,10 @@
 //! so that a tree is never left half done.
 
 use super::{
+    block::{BLOCK_SIZE, Block, BlockOf, Primitives},
     node::{ChildRef, Node, half_area, ranks},
     tree::Tree,
-    triangles::{BLOCK_SIZE, Block, Triangles},
+    triangles::Triangles,
 };
 use crate::{bounds::Aabb, build::tasks};
 
@@ -21,7 +22,10 @@ const BLOCKS_PER_PIECE: usize = tasks::PIECE_SIZE / BLOCK_SIZE;
 
 impl<const N: usize, const W: usize, B: Block> Tree<N, W, B> {
     /// Moves the tree to other vertices of the same number of triangles in each mesh.
-    pub(crate) fn refit(&mut self, triangles: &Triangles<'_>) {
+    pub(crate) fn refit<'t>(&mut self, triangles: &Triangles<'t>)
+    where
+        B: BlockOf<Triangles<'t>>,
+    {
         if B::INDEXED && !self.nodes.is_empty() {
             self.points = triangles.points();
         }
@@ -55,7 +59,11 @@ impl<const N: usize, const W: usize, B: Block> Tree<N, W, B> {
 }
 
 /// Rewrites blocks and finds the box of each.
-fn refit_blocks<B: Block>(blocks: &mut [B], bounds: &mut [Aabb], triangles: &Triangles<'_>) {
+fn refit_blocks<'t, B: BlockOf<Triangles<'t>>>(
+    blocks: &mut [B],
+    bounds: &mut [Aabb],
+    triangles: &Triangles<'t>,
+) {
     if blocks.len() > BLOCKS_PER_PIECE {
         let middle = blocks.len() / 2;
         let (left, right) = blocks.split_at_mut(middle);
