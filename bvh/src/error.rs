@@ -99,6 +99,17 @@ pub enum BuildError {
         /// Number of the box, from 0.
         index: usize,
     },
+    /// The build was told to stop.
+    #[error("the build was cancelled")]
+    Cancelled,
+    /// The build would take more memory than it may.
+    #[error("the build needs {needed} bytes, but may take only {limit}")]
+    MemoryLimit {
+        /// Bytes that the workspace would take.
+        needed: usize,
+        /// Bytes that it may take.
+        limit: usize,
+    },
     /// A mesh that cannot be numbered.
     #[error(transparent)]
     Mesh(#[from] MeshError),

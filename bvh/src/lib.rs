@@ -33,7 +33,10 @@ mod traverse;
 
 pub use bounds::Aabb;
 pub use boxes::{BoxBvh, BoxHit, segments};
-pub use build::{BuildWorkspace, LeafReference};
+pub use build::{
+    BuildWorkspace, LeafReference,
+    control::{BuildControl, ProgressFn},
+};
 pub use bvh::{Bvh, Refit};
 pub use error::{BuildError, ParameterFault, RefitError};
 pub use glam::Vec3;

@@ -500,6 +500,16 @@ impl BuildParams {
         canonical
     }
 
+    /// The most references that are made of `n` primitives.
+    pub(crate) fn reference_capacity(&self, n: usize) -> usize {
+        match self.quality {
+            Quality::SpatialSplits | Quality::Optimized => {
+                (f64::from(self.split_budget) * n as f64) as usize
+            }
+            _ => n,
+        }
+    }
+
     /// The shift that rounds a count up to blocks: ⌊log2 `sah_block_size`⌋.
     pub(crate) fn sah_block_shift(&self) -> u32 {
         self.sah_block_size.max(1).ilog2()

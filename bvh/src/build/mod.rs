@@ -12,6 +12,7 @@ use binning::{AsEmbree, Exact};
 mod binary;
 pub(crate) mod binning;
 mod collapse;
+pub(crate) mod control;
 mod introsort;
 mod morton;
 pub(crate) mod partition;
@@ -33,11 +34,17 @@ pub(crate) fn build<C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
     if workspace.references.is_empty() {
         return Ok(None);
     }
-    match params.rounding {
+    let n = workspace.references.len();
+    workspace.control.check()?;
+    workspace.control.check_memory(n, params)?;
+    let root = match params.rounding {
         Rounding::Exact => build_rounded::<Exact, C>(workspace, corners, params),
         Rounding::Embree => build_rounded::<AsEmbree, C>(workspace, corners, params),
+    }?;
+    if let Some(progress) = &workspace.control.progress {
+        progress(n, n);
     }
-    .map(Some)
+    Ok(Some(root))
 }
 
 fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
@@ -46,7 +53,7 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
     params: &BuildParams,
 ) -> Result<record::Record, BuildError> {
     let n = workspace.references.len();
-    let capacity = (f64::from(params.split_budget) * n as f64) as usize;
+    let capacity = params.reference_capacity(n);
     let corners = corners.filter(|_| {
         matches!(params.quality, Quality::SpatialSplits | Quality::Optimized)
             && capacity > n
@@ -77,7 +84,9 @@ fn optimized<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
 ) -> Result<record::Record, BuildError> {
     let root = recursion::build_binary::<R, C>(workspace, params, cuts)?;
     workspace.binary.load(&workspace.records, &root);
+    workspace.control.check()?;
     reinsertion::optimize(&mut workspace.binary, &mut workspace.reinsertion);
+    workspace.control.check()?;
     collapse::collapse_loaded(workspace, params)
 }
 
@@ -93,6 +102,8 @@ pub struct LeafReference {
 /// The temporary memory of a build, for reuse by the next one.
 #[derive(Debug, Default)]
 pub struct BuildWorkspace {
+    /// Cancellation, progress and the limit of memory of the builds in this workspace.
+    pub control: control::BuildControl,
     pub(crate) references: Vec<primitive::PrimitiveRef>,
     pub(crate) scratch: Vec<primitive::PrimitiveRef>,
     pub(crate) leaves: Vec<LeafReference>,

@@ -13,6 +13,7 @@ use wide::f32x4;
 use super::{
     BuildWorkspace, LeafReference,
     binning::Rounding,
+    control::{CHECK_SIZE, Running},
     introsort,
     primitive::{Bounds, PrimitiveRef},
     radix,
@@ -47,6 +48,7 @@ pub(crate) fn build<R: Rounding>(
     workspace.keys.clear();
     workspace.keys.extend(0..n as u64);
     let builder = Builder::<R> {
+        running: Running::new(&workspace.control, n),
         params: params.canonical(),
         references: &workspace.references,
         rounding: std::marker::PhantomData,
@@ -86,6 +88,7 @@ struct Range<'a> {
 }
 
 struct Builder<'a, R> {
+    running: Running<'a>,
     params: BuildParams,
     references: &'a [PrimitiveRef],
     rounding: std::marker::PhantomData<R>,
@@ -156,6 +159,9 @@ impl<R: Rounding> Builder<'_, R> {
 
     fn subtree(&self, range: Range<'_>, level: u32) -> Result<Record, BuildError> {
         let n = range.keys.len();
+        if n >= CHECK_SIZE {
+            self.running.check()?;
+        }
         if n <= self.params.min_leaf_size as usize
             || level + RESERVED_LEVELS >= self.params.max_depth
         {
@@ -250,12 +256,16 @@ impl<R: Rounding> Builder<'_, R> {
             (keys, leaves, records) = (other_keys, other_leaves, other_records);
             (begin, records_begin) = (begin + n, records_begin + 2 * n - 2);
         }
+        let parent = spans.iter().map(|span| span.1).sum();
         tasks::fill_from_jobs(
             &mut jobs[..spans.len()],
             own,
             &mut (),
             &|range: &Range<'_>| range.keys.len(),
-            &|range, ()| build(self, range, level + 1),
+            &|range, ()| {
+                let n = range.keys.len();
+                build(self, range, level + 1).inspect(|_| self.running.finished(n, parent))
+            },
         )?;
         Ok(Record::inner_around(range.records_begin, own))
     }

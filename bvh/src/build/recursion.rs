@@ -11,6 +11,7 @@ use glam::Vec3;
 use super::{
     BuildWorkspace, LeafReference,
     binning::{self, Rounding},
+    control::{CHECK_SIZE, Running},
     introsort, partition,
     primitive::{Bounds, PrimitiveRef, RangeBounds},
     record::Record,
@@ -87,6 +88,9 @@ where
 /// Gives references budgets for cuts, and room for what cuts make.
 fn make_room(workspace: &mut BuildWorkspace, capacity: usize) {
     spatial::give_budgets(&mut workspace.references);
+    // Exactly: a vector that grows on its own doubles.
+    let room = capacity - workspace.references.len();
+    workspace.references.reserve_exact(room);
     workspace
         .references
         .resize(capacity, workspace.references[0]);
@@ -112,6 +116,7 @@ where
         &RangeBounds::merge,
     );
     let builder = Builder::<R, C> {
+        running: Running::new(&workspace.control, n),
         params: params.canonical(),
         reserved_levels,
         block_shift: params.sah_block_shift(),
@@ -250,7 +255,8 @@ struct Memory {
 /// Builds the subtree over a range at a level, the root being level 1.
 type BuildSubtree<B> = fn(&B, Range<'_>, Slots<'_>, &mut Memory, u32) -> Result<Record, BuildError>;
 
-struct Builder<R, C> {
+struct Builder<'a, R, C> {
+    running: Running<'a>,
     params: BuildParams,
     reserved_levels: u32,
     block_shift: u32,
@@ -260,7 +266,7 @@ struct Builder<R, C> {
     rounding: std::marker::PhantomData<R>,
 }
 
-impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
+impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
     fn find_split(&self, range: &Range<'_>, memory: &mut Memory) -> Option<Split> {
         let (references, bounds) = (range.references(), &range.bounds);
         let object = binning::find_split::<R>(
@@ -342,6 +348,9 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
+        if n >= CHECK_SIZE {
+            self.running.check()?;
+        }
         let at_limit = level + self.reserved_levels >= self.params.max_depth;
         if n <= self.params.min_leaf_size as usize || at_limit {
             range.sort::<R>();
@@ -440,12 +449,17 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
             rest_begin += needed;
         }
         let count = own.len();
+        let parent = jobs.iter().flatten().map(|(range, _)| range.len).sum();
         tasks::fill_from_jobs(
             &mut jobs[..count],
             own,
             memory,
             &|(range, _): &(Range<'_>, Slots<'_>)| range.len,
-            &|(range, slots), memory| build(self, range, slots, memory, level + 1),
+            &|(range, slots), memory| {
+                let n = range.len;
+                build(self, range, slots, memory, level + 1)
+                    .inspect(|_| self.running.finished(n, parent))
+            },
         )?;
         Ok(Record::inner(&bounds.geometry, slots.begin, own))
     }

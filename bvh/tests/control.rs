@@ -1,0 +1,107 @@
+//! Builds that are watched, stopped and limited.
+
+use std::sync::{
+    Arc, Mutex,
+    atomic::{AtomicBool, Ordering},
+};
+
+use raywright_bvh::{
+    BuildControl, BuildError, BuildParams, BuildWorkspace, Bvh, PARAMETERS, ParameterRange,
+    TriangleMesh, Vec3,
+};
+
+/// A terrain of 2 n² triangles.
+fn terrain(n: u32) -> TriangleMesh {
+    let height = |x: u32, y: u32| ((x * 7919 + y * 104_729) % 1009) as f32 / 500.0;
+    let vertices = (0..=n)
+        .flat_map(|y| (0..=n).map(move |x| Vec3::new(x as f32, height(x, y), y as f32)))
+        .collect();
+    let triangles = (0..n)
+        .flat_map(|y| (0..n).map(move |x| y * (n + 1) + x))
+        .flat_map(|a| [[a, a + 1, a + n + 1], [a + 1, a + n + 2, a + n + 1]])
+        .collect();
+    TriangleMesh::new(vertices, triangles).unwrap()
+}
+
+fn every_quality() -> Vec<BuildParams> {
+    let quality = PARAMETERS.iter().find(|p| p.name == "quality").unwrap();
+    let ParameterRange::Words(_, words) = quality.range else {
+        panic!("quality has words");
+    };
+    let params = words.iter().map(|word| {
+        let mut params = BuildParams::default();
+        params.set("quality", word).unwrap();
+        params
+    });
+    params.collect()
+}
+
+#[test]
+fn progress_never_passes_the_total_and_ends_with_it() {
+    let mesh = terrain(100);
+    for params in every_quality() {
+        let seen = Arc::new(Mutex::new(vec![]));
+        let mut workspace = BuildWorkspace::default();
+        let log = seen.clone();
+        workspace.control = BuildControl {
+            progress: Some(Arc::new(move |done, total| {
+                log.lock().unwrap().push((done, total));
+            })),
+            ..BuildControl::default()
+        };
+        Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+        let seen = seen.lock().unwrap();
+        assert!(seen.iter().all(|&(done, total)| done <= total));
+        assert_eq!(seen.last(), Some(&(20_000, 20_000)), "{:?}", params.quality);
+    }
+}
+
+#[test]
+fn a_cancelled_build_is_an_error_and_the_workspace_goes_on() {
+    let mesh = terrain(100);
+    for params in every_quality() {
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let mut workspace = BuildWorkspace::default();
+        let old = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+        let stop = cancelled.clone();
+        workspace.control = BuildControl {
+            cancelled: Some(cancelled.clone()),
+            // The first finished part stops the rest.
+            progress: Some(Arc::new(move |_, _| stop.store(true, Ordering::Relaxed))),
+            memory_limit: None,
+        };
+        cancelled.store(true, Ordering::Relaxed);
+        let got = Bvh::build_in(&[&mesh], &params, &mut workspace).err();
+        assert_eq!(got, Some(BuildError::Cancelled), "{:?}", params.quality);
+        workspace.control = BuildControl::default();
+        let again = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+        assert_eq!(again.stats(), old.stats());
+    }
+}
+
+#[test]
+fn memory_is_what_was_announced_and_a_limit_is_kept() {
+    let mesh = terrain(100);
+    let n = mesh.triangles().len();
+    for params in every_quality() {
+        let needed = BuildWorkspace::bytes_needed(n, &params);
+        let mut workspace = BuildWorkspace::default();
+        workspace.control.memory_limit = Some(needed - 1);
+        let got = Bvh::build_in(&[&mesh], &params, &mut workspace).err();
+        let limit = needed - 1;
+        assert_eq!(got, Some(BuildError::MemoryLimit { needed, limit }));
+        workspace.control.memory_limit = Some(needed);
+        let mut bytes = vec![];
+        for _ in 0..5 {
+            Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+            bytes.push(workspace.bytes());
+        }
+        assert!(
+            bytes[0] <= needed,
+            "{:?}: {} of {needed} bytes",
+            params.quality,
+            bytes[0]
+        );
+        assert!(bytes.iter().all(|&b| b == bytes[0]), "{bytes:?}");
+    }
+}
