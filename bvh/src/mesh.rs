@@ -2,7 +2,10 @@
 //!
 //! Invariants, checked once when a mesh is made so that nothing behind it has to check again:
 //! every index names a vertex, and every vertex that a triangle uses is finite. Triangles of zero
-//! area are allowed: they keep their number and are never hit.
+//! area are allowed and keep their number. One that uses a point twice is never hit; one with three
+//! points on a line is hit by the robust test at most, which sees it as thin as rounding makes it:
+//! without it, there would be a gap between its neighbours. Such a hit lies in the triangle's box,
+//! but its weights, and its place along the line, are quotients of rounding errors.
 
 use glam::Vec3;
 

@@ -7,7 +7,7 @@ use common::{bits, built_qualities, random_rays, sphere};
 use proptest::prelude::*;
 use raywright_bvh::{
     Accuracy, BuildError, BuildParams, Bvh, LeafFormat, MeshError, Quality, Ray, RefitError,
-    TriangleMesh, Vec3, reference,
+    TriangleMesh, Vec3, Work, reference,
 };
 
 /// Parameters of every built quality × width × leaf format × accuracy.
@@ -146,6 +146,63 @@ fn drift_tells_neighbours_that_part_from_those_that_bend() {
     let fresh = Bvh::build(&[&scattered], &BuildParams::default()).unwrap();
     assert!(parted > 3.0, "{parted}");
     assert!(tree.stats().sah_cost > 3.0 * fresh.stats().sah_cost);
+}
+
+#[test]
+fn slots_and_orders_follow_what_moves() {
+    let mesh = sphere(24);
+    let turned = moved(&mesh, |v| -v);
+    let rays = random_rays(&[&mesh], 500, 9);
+    for params in all_params() {
+        // Built while all was turned by a point reflection: every order and no area is another.
+        let mut tree = Bvh::build(&[&turned], &params).unwrap();
+        let is_cut = tree.stats().duplication > 1.0;
+        tree.refit(&[&mesh]).unwrap();
+        let (mut refitted, mut fresh) = (Work::default(), Work::default());
+        let built = Bvh::build(&[&mesh], &params).unwrap();
+        for ray in &rays {
+            let hit = tree.closest_hit_with_work(ray, &mut refitted);
+            assert_eq!(
+                bits(hit),
+                bits(built.closest_hit_with_work(ray, &mut fresh))
+            );
+        }
+        let ratio = refitted.nodes as f64 / fresh.nodes as f64;
+        assert!(
+            ratio < if is_cut { 1.15 } else { 1.05 },
+            "{ratio} {params:?}"
+        );
+    }
+}
+
+#[test]
+fn trees_of_parts_of_triangles_are_refitted_to_whole_ones() {
+    // Long triangles across each other: worth a cut.
+    let long = |number: u32| {
+        let mut random = common::Random(u64::from(number) + 1);
+        let (a, b) = (random.vector(), random.vector());
+        [a, b, (a + b) * 0.5 + random.vector() * 0.05]
+    };
+    let vertices: Vec<Vec3> = (0..400).flat_map(long).collect();
+    let triangles: Vec<_> = (0..400).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+    let other = moved(&mesh, |v| Vec3::new(v.y, v.z + v.x, -v.x) * 3.0);
+    let rays = random_rays(&[&other], 100, 11);
+    for mut params in all_params() {
+        params.quality = Quality::SpatialSplits;
+        let mut tree = Bvh::build(&[&mesh], &params).unwrap();
+        assert!(tree.stats().duplication > 1.2);
+        let refit = tree.refit(&[&mesh]).unwrap();
+        assert!(
+            refit.sah_drift() > 1.05,
+            "parts have smaller boxes: {refit:?}"
+        );
+        tree.refit(&[&other]).unwrap();
+        for ray in &rays {
+            let expected = reference::closest_hit(&[&other], ray, params.accuracy).unwrap();
+            assert_eq!(bits(tree.closest_hit(ray)), bits(expected), "{params:?}");
+        }
+    }
 }
 
 #[test]

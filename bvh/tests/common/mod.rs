@@ -4,7 +4,8 @@
 #![allow(dead_code)]
 
 use raywright_bvh::{
-    Aabb, BuildParams, Hit, PARAMETERS, ParameterRange, Quality, Ray, TriangleMesh, Vec3,
+    Aabb, BuildParams, BuildPrimitive, Hierarchy, Hit, LeafReference, PARAMETERS, ParameterRange,
+    Quality, Ray, TriangleMesh, Vec3,
 };
 
 pub(crate) type Bits = Option<(u32, u32, u32, u32, u32)>;
@@ -134,4 +135,38 @@ pub(crate) fn random_rays(meshes: &[&TriangleMesh], count: usize, seed: u64) -> 
             }
         })
         .collect()
+}
+
+/// Threads of its own for a build, each with so much stack.
+pub(crate) fn pool(threads: usize, stack_bytes: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .stack_size(stack_bytes)
+        .build()
+        .unwrap()
+}
+
+/// One primitive per triangle of a mesh.
+pub(crate) fn primitives(mesh: &TriangleMesh) -> Vec<BuildPrimitive> {
+    (0..mesh.triangles().len() as u32)
+        .map(|primitive_id| BuildPrimitive {
+            bounds: (mesh.corners(primitive_id).into_iter()).fold(Aabb::EMPTY, Aabb::extended_by),
+            geometry_id: 0,
+            primitive_id,
+        })
+        .collect()
+}
+
+/// Everything that is in a hierarchy: of each node, depth first, the level, the box as bits, and
+/// the references if it is a leaf.
+pub(crate) fn contents(tree: &Hierarchy) -> Vec<(usize, [u32; 6], Vec<LeafReference>)> {
+    let mut all = Vec::new();
+    let mut stack: Vec<_> = tree.root().map(|root| (1, root)).into_iter().collect();
+    while let Some((level, node)) = stack.pop() {
+        let Aabb { min, max } = node.bounds();
+        let bits = [min.x, min.y, min.z, max.x, max.y, max.z].map(f32::to_bits);
+        all.push((level, bits, node.leaf().unwrap_or_default().to_vec()));
+        stack.extend(node.children().map(|child| (level + 1, child)));
+    }
+    all
 }
