@@ -6,14 +6,14 @@ use crate::{
     layout::{
         emit::Source,
         tree::Tree,
-        triangles::{CornerBlock, EdgeBlock, IndexBlock},
+        triangles::{CornerBlock, EdgeBlock, IndexBlock, Triangles},
     },
     params::{Accuracy, BuildParams, LeafFormat},
     simd::{
         Isa,
         dispatch::{self, Width, Widths},
     },
-    stats::TreeStats,
+    stats::{TreeStats, sah_cost},
     traverse::{
         fast::Fast,
         kernel::{Candidate, Count, RaySetup},
@@ -43,17 +43,21 @@ pub(crate) enum Formatted<const N: usize, const W: usize> {
 macro_rules! for_width {
     ($any:expr, $tree:ident => $result:expr) => {
         match $any {
-            AnyTree::Two($tree) => $result,
-            AnyTree::Four($tree) => $result,
-            AnyTree::Eight($tree) => $result,
-            AnyTree::Sixteen($tree) => $result,
+            Self::Two($tree) => $result,
+            Self::Four($tree) => $result,
+            Self::Eight($tree) => $result,
+            Self::Sixteen($tree) => $result,
         }
     };
 }
+pub(crate) use for_width;
 
 impl AnyTree {
     /// The tree of a build.
-    pub(crate) fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+    pub(crate) fn new(
+        source: &Source<'_, Triangles<'_>>,
+        params: &BuildParams,
+    ) -> Result<Self, BuildError> {
         Ok(match params.branching_factor {
             ..=2 => Self::Two(Formatted::new(source, params)?),
             3..=4 => Self::Four(Formatted::new(source, params)?),
@@ -64,6 +68,15 @@ impl AnyTree {
 
     pub(crate) fn stats(&self, params: &BuildParams) -> TreeStats {
         for_width!(self, tree => tree.stats(params))
+    }
+
+    pub(crate) fn sah_cost(&self, params: &BuildParams) -> f64 {
+        for_width!(self, tree => tree.sah_cost(params))
+    }
+
+    /// Moves the tree to other vertices of the same triangles.
+    pub(crate) fn refit(&mut self, triangles: &Triangles<'_>) {
+        for_width!(self, tree => tree.refit(triangles));
     }
 
     #[inline]
@@ -86,7 +99,7 @@ impl<const N: usize, const W: usize> Formatted<N, W>
 where
     Widths: Width<N>,
 {
-    fn new(source: &Source<'_>, params: &BuildParams) -> Result<Self, BuildError> {
+    fn new(source: &Source<'_, Triangles<'_>>, params: &BuildParams) -> Result<Self, BuildError> {
         Ok(match (params.leaf_format, params.accuracy) {
             (LeafFormat::Edges, Accuracy::Fast) => Self::Fast(source.emit()?),
             (LeafFormat::Edges, Accuracy::Robust) => Self::Robust(source.emit()?),
@@ -100,6 +113,22 @@ where
             Self::Fast(tree) => TreeStats::of(tree, params),
             Self::Robust(tree) => TreeStats::of(tree, params),
             Self::CompactFast(tree) | Self::CompactRobust(tree) => TreeStats::of(tree, params),
+        }
+    }
+
+    fn sah_cost(&self, params: &BuildParams) -> f64 {
+        match self {
+            Self::Fast(tree) => sah_cost(tree, params),
+            Self::Robust(tree) => sah_cost(tree, params),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => sah_cost(tree, params),
+        }
+    }
+
+    fn refit(&mut self, triangles: &Triangles<'_>) {
+        match self {
+            Self::Fast(tree) => tree.refit(triangles),
+            Self::Robust(tree) => tree.refit(triangles),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => tree.refit(triangles),
         }
     }
 

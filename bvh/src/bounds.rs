@@ -27,6 +27,15 @@ impl Aabb {
         }
     }
 
+    /// What both have in common; empty if that is nothing.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
     /// The smallest box that holds this one and a point.
     #[must_use]
     pub fn extended_by(self, point: Vec3) -> Self {

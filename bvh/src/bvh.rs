@@ -10,8 +10,11 @@ use crate::{
         primitive::{Bounds, PrimitiveRef},
         tasks,
     },
-    error::BuildError,
-    layout::{emit::Source, triangles::Triangles},
+    error::{BuildError, RefitError},
+    layout::{
+        emit::Source,
+        triangles::{Triangles, locate},
+    },
     mesh::{MeshError, TriangleMesh},
     params::BuildParams,
     ray::{Hit, Ray, Work},
@@ -40,6 +43,37 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
+    last_refit: Option<Refit>,
+}
+
+/// What a refit did to the cost of a tree, in the unit of
+/// [`TreeStats::sah_cost`](crate::TreeStats::sah_cost).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Refit {
+    /// Cost of the tree as it was built.
+    pub sah_cost_built: f64,
+    /// Cost before this refit.
+    pub sah_cost_before: f64,
+    /// Cost after it.
+    pub sah_cost_after: f64,
+}
+
+impl Refit {
+    /// Cost after the refit over the cost of the tree as it was built: 1 if nothing has become
+    /// worse. Where primitives were cut it is above 1 from the first refit on, even if nothing
+    /// moves, since refitted boxes hold whole triangles.
+    ///
+    /// Both costs are relative to their own root box. So a scene of which one part moves away makes
+    /// the drift smaller than the loss in the part that stays.
+    #[must_use]
+    pub fn sah_drift(&self) -> f64 {
+        if self.sah_cost_built > 0.0 {
+            self.sah_cost_after / self.sah_cost_built
+        } else {
+            1.0
+        }
+    }
 }
 
 impl Bvh {
@@ -82,7 +116,7 @@ impl Bvh {
             root,
             records: &workspace.records,
             leaves: &workspace.leaves,
-            triangles: Triangles {
+            primitives: Triangles {
                 meshes,
                 first_ids: &first_ids,
                 first_points: &first_points(meshes)?,
@@ -100,7 +134,74 @@ impl Bvh {
             bounds,
             params: *params,
             isa: Isa::best(),
+            last_refit: None,
         })
+    }
+
+    /// Moves the tree to new vertices: the same meshes in the same order with as many triangles
+    /// each. Hits are then those of a tree that is built anew, to the last bit; only the speed may
+    /// differ. Vertices, their number, and even which of them a triangle uses, may be others.
+    ///
+    /// Which triangles are together in a node and a leaf stays as the build decided. While things
+    /// only bend and turn a little, a refit costs a fraction of a build and loses little. Triangles
+    /// that were neighbours and drift apart make boxes large: build anew when
+    /// [`Refit::sah_drift`] times the time spent on rays costs more than a build, a drift of 1.5
+    /// being a usual limit without measurement. A tree that was built while all lay in one point or
+    /// plane was divided without knowing what it would become: it is worth a build as soon as it is
+    /// unfolded. After spatial splits, the boxes are those of whole triangles (nobody knows where
+    /// the parts of a cut triangle would move), so that the gain of the splits is gone while their
+    /// references remain: a quality without cuts serves moving meshes better.
+    ///
+    /// # Errors
+    /// [`RefitError`] if there are other numbers of meshes or triangles, or for what
+    /// [`Bvh::build`] refuses in the meshes. The tree is then as it was before.
+    pub fn refit(&mut self, meshes: &[&TriangleMesh]) -> Result<Refit, RefitError> {
+        self.check_counts(meshes)?;
+        let bounds = bounds_of(meshes);
+        let scale = scale_of(&bounds)?;
+        let first_points = first_points(meshes)?;
+        let (sah_cost_built, sah_cost_before) = match self.last_refit {
+            Some(last) => (last.sah_cost_built, last.sah_cost_after),
+            None => {
+                let cost = self.tree.sah_cost(&self.params);
+                (cost, cost)
+            }
+        };
+        self.tree.refit(&Triangles {
+            meshes,
+            first_ids: &self.first_ids,
+            first_points: &first_points,
+            scale,
+        });
+        (self.scale, self.bounds) = (scale, bounds);
+        let refit = Refit {
+            sah_cost_built,
+            sah_cost_before,
+            sah_cost_after: self.tree.sah_cost(&self.params),
+        };
+        self.last_refit = Some(refit);
+        Ok(refit)
+    }
+
+    fn check_counts(&self, meshes: &[&TriangleMesh]) -> Result<(), RefitError> {
+        let built = self.first_ids.len() - 1;
+        if meshes.len() != built {
+            return Err(RefitError::MeshCount {
+                given: meshes.len(),
+                built,
+            });
+        }
+        for (geometry_id, (mesh, ids)) in meshes.iter().zip(self.first_ids.windows(2)).enumerate() {
+            let (given, built) = (mesh.triangles().len(), (ids[1] - ids[0]) as usize);
+            if given != built {
+                return Err(RefitError::TriangleCount {
+                    geometry_id,
+                    given,
+                    built,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine
@@ -180,7 +281,10 @@ impl Bvh {
 /// The hit in the caller's units and ids.
 #[inline]
 pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32]) -> Hit {
-    let (geometry_id, primitive_id) = locate(first_ids, candidate.id);
+    let LeafReference {
+        geometry_id,
+        primitive_id,
+    } = locate(first_ids, candidate.id);
     Hit {
         // A ray that starts on a triangle meets it at 0 of either sign.
         t: setup.unscaled(candidate.t) + 0.0,
@@ -229,14 +333,6 @@ fn first_points(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, BuildError> {
     }
     first_points.push(next);
     Ok(first_points)
-}
-
-/// Geometry id and primitive id of a triangle, by its number over all meshes.
-#[inline]
-fn locate(first_ids: &[u32], id: u32) -> (u32, u32) {
-    // The last mesh that begins at or before it: empty meshes begin where the next one does.
-    let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
-    (geometry_id as u32, id - first_ids[geometry_id])
 }
 
 /// Fills in the box of each triangle in the caller's coordinates; gives the box around them.

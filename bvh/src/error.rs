@@ -93,9 +93,44 @@ pub enum BuildError {
         /// The largest number allowed.
         limit: usize,
     },
+    /// A box that is empty or not finite, where boxes are the primitives.
+    #[error("box {index} is empty or not finite")]
+    InvalidBox {
+        /// Number of the box, from 0.
+        index: usize,
+    },
     /// A mesh that cannot be numbered.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+}
+
+/// Why a tree was not moved to new vertices. It is then as it was before.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RefitError {
+    /// Not as many meshes as the tree was built over.
+    #[error("{given} meshes, but the tree was built over {built}")]
+    MeshCount {
+        /// Meshes given.
+        given: usize,
+        /// Meshes of the build.
+        built: usize,
+    },
+    /// A mesh with another number of triangles.
+    #[error(
+        "mesh {geometry_id} has {given} triangles, but the tree was built over {built} of them"
+    )]
+    TriangleCount {
+        /// Which mesh.
+        geometry_id: usize,
+        /// Triangles given.
+        given: usize,
+        /// Triangles of the build.
+        built: usize,
+    },
+    /// Something that a build refuses as well.
+    #[error(transparent)]
+    Build(#[from] BuildError),
 }
 
 fn join(faults: &[ParameterFault]) -> String {

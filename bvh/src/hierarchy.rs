@@ -15,6 +15,7 @@ use crate::{
     },
     error::BuildError,
     params::BuildParams,
+    stats::TreeStats,
 };
 
 /// Something to build over: a box and two ids of the caller's.
@@ -80,6 +81,13 @@ impl Hierarchy {
             .as_ref()
             .map(|record| HierarchyNode { tree: self, record })
     }
+
+    /// Counts, depth, fill, cost and overlap, found by walking through the tree; costs and block
+    /// size are those of `params`, and its `branching_factor` says what a full node is.
+    #[must_use]
+    pub fn stats(&self, params: &BuildParams) -> TreeStats {
+        TreeStats::of_records(self.root.as_ref(), &self.records, &self.leaves, params)
+    }
 }
 
 impl<'a> HierarchyNode<'a> {
@@ -92,7 +100,9 @@ impl<'a> HierarchyNode<'a> {
     /// The primitives of a leaf; `None` for an inner node.
     #[must_use]
     pub fn leaf(&self) -> Option<&'a [LeafReference]> {
-        (self.record.kind == Kind::Leaf).then(|| &self.tree.leaves[self.record.range()])
+        self.record
+            .is_leaf()
+            .then(|| &self.tree.leaves[self.record.range()])
     }
 
     /// The children of an inner node; none for a leaf.

@@ -17,6 +17,7 @@
 
 mod any_tree;
 mod bounds;
+mod boxes;
 mod build;
 mod bvh;
 mod error;
@@ -31,9 +32,10 @@ mod stats;
 mod traverse;
 
 pub use bounds::Aabb;
+pub use boxes::{BoxBvh, BoxHit, segments};
 pub use build::{BuildWorkspace, LeafReference};
-pub use bvh::Bvh;
-pub use error::{BuildError, ParameterFault};
+pub use bvh::{Bvh, Refit};
+pub use error::{BuildError, ParameterFault, RefitError};
 pub use glam::Vec3;
 pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
 pub use mesh::{MeshError, TriangleMesh};

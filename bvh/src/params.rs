@@ -128,7 +128,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["morton", "binned-sah", "spatial-splits"],
+            &["morton", "binned-sah", "spatial-splits", "optimized"],
         ),
         tuned: ParameterRange::Words(
             &[
@@ -138,7 +138,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["morton", "binned-sah", "spatial-splits"],
+            &["morton", "binned-sah", "spatial-splits", "optimized"],
         ),
         changes_hits: false,
         meaning: "how primitives are divided into subtrees",

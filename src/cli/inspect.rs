@@ -45,6 +45,8 @@ struct Report {
     indicators: Vec<(&'static str, f64)>,
     parameters: Vec<(String, String)>,
     tree: Vec<(&'static str, f64)>,
+    /// How many leaves have so many references as the place says.
+    leaf_sizes: Vec<usize>,
     build_ms: f64,
     notes: Vec<String>,
 }
@@ -57,6 +59,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
         let start = Instant::now();
         let tree = stage.world.build_tree(&params, &mut Default::default())?;
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let stats = tree.stats();
         let scene = stage.world.scene();
         let bounds = scene.bounds();
         let corner = |v: raywright::bvh::Vec3| {
@@ -85,7 +88,8 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
             camera_vertical_fov_degrees: stage.camera.vertical_fov_degrees,
             indicators: Indicators::of(scene, &stage.camera).named().collect(),
             parameters: raywright::tune::described(&params),
-            tree: tree_rows(&tree.stats()),
+            tree: tree_rows(&stats),
+            leaf_sizes: stats.leaf_sizes,
             build_ms,
             notes: stage.notes,
         })
@@ -102,9 +106,12 @@ fn tree_rows(stats: &TreeStats) -> Vec<(&'static str, f64)> {
         ("nodes", stats.nodes as f64),
         ("leaves", stats.leaves as f64),
         ("references", stats.references as f64),
+        ("duplication", stats.duplication),
         ("depth", stats.depth as f64),
         ("largest_leaf", stats.largest_leaf as f64),
         ("node_fill", stats.node_fill),
+        ("leaf_fill", stats.leaf_fill),
+        ("overlap", stats.overlap),
         ("sah_nodes", stats.sah_nodes),
         ("sah_primitives", stats.sah_primitives),
         ("sah_blocks", stats.sah_blocks),
@@ -153,7 +160,17 @@ fn print(report: &Report) -> Result<(), Failure> {
         .tree
         .iter()
         .map(|(name, value)| (*name, number(*value)));
-    section("tree", tree.chain([("build_ms", number(report.build_ms))]))
+    section("tree", tree.chain([("build_ms", number(report.build_ms))]))?;
+    let sizes = report.leaf_sizes.iter().enumerate();
+    let rows: Vec<_> = sizes
+        .filter(|&(_, &leaves)| leaves > 0)
+        .map(|(size, leaves)| (size.to_string(), leaves.to_string()))
+        .collect();
+    section(
+        "leaves by number of references",
+        rows.iter()
+            .map(|(size, leaves)| (size.as_str(), leaves.clone())),
+    )
 }
 
 fn section<'a>(

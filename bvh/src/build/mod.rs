@@ -9,7 +9,9 @@ use crate::{
 };
 use binning::{AsEmbree, Exact};
 
+mod binary;
 pub(crate) mod binning;
+mod collapse;
 mod introsort;
 mod morton;
 pub(crate) mod partition;
@@ -17,6 +19,7 @@ pub(crate) mod primitive;
 mod radix;
 pub(crate) mod record;
 pub(crate) mod recursion;
+mod reinsertion;
 mod spatial;
 pub(crate) mod tasks;
 
@@ -43,21 +46,39 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
     params: &BuildParams,
 ) -> Result<record::Record, BuildError> {
     let n = workspace.references.len();
+    let capacity = (f64::from(params.split_budget) * n as f64) as usize;
+    let corners = corners.filter(|_| {
+        matches!(params.quality, Quality::SpatialSplits | Quality::Optimized)
+            && capacity > n
+            && workspace
+                .references
+                .iter()
+                .all(|reference| reference.geometry_id() < primitive::CUT_ID_LIMIT)
+    });
     match (params.quality, corners) {
-        (Quality::SpatialSplits, Some(corners)) => {
-            let capacity = (f64::from(params.split_budget) * n as f64) as usize;
-            let can_cut = |reference: &primitive::PrimitiveRef| {
-                reference.geometry_id() < primitive::CUT_ID_LIMIT
-            };
-            if capacity > n && workspace.references.iter().all(can_cut) {
-                recursion::build_with_cuts::<R, C>(workspace, params, capacity, corners)
-            } else {
-                recursion::build::<R>(workspace, params)
-            }
-        }
+        (Quality::Optimized, corners) => optimized::<R, C>(
+            workspace,
+            corners.map(|corners| (capacity, corners)),
+            params,
+        ),
         (Quality::Morton, _) => morton::build::<R>(workspace, params),
-        _ => recursion::build::<R>(workspace, params),
+        (_, Some(corners)) => {
+            recursion::build_with_cuts::<R, C>(workspace, params, capacity, corners)
+        }
+        (_, None) => recursion::build::<R>(workspace, params),
     }
+}
+
+/// A binary tree with a leaf for each part of a primitive, optimised and collapsed.
+fn optimized<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
+    workspace: &mut BuildWorkspace,
+    cuts: Option<(usize, C)>,
+    params: &BuildParams,
+) -> Result<record::Record, BuildError> {
+    let root = recursion::build_binary::<R, C>(workspace, params, cuts)?;
+    workspace.binary.load(&workspace.records, &root);
+    reinsertion::optimize(&mut workspace.binary, &mut workspace.reinsertion);
+    collapse::collapse_loaded(workspace, params)
 }
 
 /// A primitive in a leaf.
@@ -78,6 +99,9 @@ pub struct BuildWorkspace {
     pub(crate) records: Vec<record::Record>,
     pub(crate) keys: Vec<u64>,
     pub(crate) keys_scratch: Vec<u64>,
+    binary: binary::BinaryTree,
+    reinsertion: reinsertion::Memory,
+    collapse: collapse::Memory,
 }
 
 impl BuildWorkspace {
@@ -89,5 +113,8 @@ impl BuildWorkspace {
             + self.leaves.capacity() * size_of::<LeafReference>()
             + self.records.capacity() * size_of::<record::Record>()
             + (self.keys.capacity() + self.keys_scratch.capacity()) * size_of::<u64>()
+            + self.binary.bytes()
+            + self.reinsertion.bytes()
+            + self.collapse.bytes()
     }
 }

@@ -6,7 +6,7 @@
 //! record array from the start, and threads never meet.
 
 use super::primitive::Bounds;
-use crate::{bounds::Aabb, layout::triangles::BLOCK_SIZE};
+use crate::{bounds::Aabb, layout::block::BLOCK_SIZE};
 
 /// What is behind a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +88,10 @@ impl Record {
     pub(crate) fn range(&self) -> std::ops::Range<usize> {
         let first = self.first as usize;
         first..first + self.count as usize
+    }
+
+    pub(crate) fn is_leaf(&self) -> bool {
+        self.kind == Kind::Leaf
     }
 
     pub(crate) fn bounds(&self) -> Aabb {

@@ -22,6 +22,11 @@ use crate::{error::BuildError, params::BuildParams, simd::Isa};
 /// Levels kept free below a tree built by costs, in which oversized ranges are halved.
 pub(crate) const RESERVED_LEVELS: u32 = 8;
 
+/// Levels of a binary tree that is to be collapsed: more than surface areas in the range of `f32`
+/// give reason for, and below them enough to halve any number of references down to one.
+const BINARY_LEVELS: u32 = 64 + BINARY_RESERVED_LEVELS;
+const BINARY_RESERVED_LEVELS: u32 = u32::BITS;
+
 /// The most children that a node can have.
 pub(crate) const MAX_CHILDREN: usize = 16;
 
@@ -35,7 +40,32 @@ pub(crate) fn build<R: Rounding>(
     params: &BuildParams,
 ) -> Result<Record, BuildError> {
     let n = workspace.references.len();
-    run::<R, NoCorners>(workspace, params, n, None)
+    run::<R, NoCorners>(workspace, params, RESERVED_LEVELS, n, None)
+}
+
+/// Builds the records of a binary tree with one reference per leaf, whatever `max_depth` is: one
+/// to be collapsed. `cuts` are a capacity and corners as for [`build_with_cuts`].
+pub(crate) fn build_binary<R: Rounding, C>(
+    workspace: &mut BuildWorkspace,
+    params: &BuildParams,
+    cuts: Option<(usize, C)>,
+) -> Result<Record, BuildError>
+where
+    C: Fn(LeafReference) -> [Vec3; 3] + Sync,
+{
+    let n = workspace.references.len();
+    let params = BuildParams {
+        branching_factor: 2,
+        min_leaf_size: 1,
+        max_leaf_size: 1,
+        max_depth: BINARY_LEVELS,
+        ..*params
+    };
+    let corners = cuts.map(|(capacity, corners)| {
+        make_room(workspace, capacity);
+        corners
+    });
+    run::<R, C>(workspace, &params, BINARY_RESERVED_LEVELS, n, corners)
 }
 
 /// Builds the records of a tree over at most `capacity` parts of `workspace.references`, of which
@@ -50,16 +80,22 @@ where
     C: Fn(LeafReference) -> [Vec3; 3] + Sync,
 {
     let n = workspace.references.len();
+    make_room(workspace, capacity);
+    run::<R, C>(workspace, params, RESERVED_LEVELS, n, Some(corners))
+}
+
+/// Gives references budgets for cuts, and room for what cuts make.
+fn make_room(workspace: &mut BuildWorkspace, capacity: usize) {
     spatial::give_budgets(&mut workspace.references);
     workspace
         .references
         .resize(capacity, workspace.references[0]);
-    run::<R, C>(workspace, params, n, Some(corners))
 }
 
 fn run<R: Rounding, C>(
     workspace: &mut BuildWorkspace,
     params: &BuildParams,
+    reserved_levels: u32,
     n: usize,
     corners: Option<C>,
 ) -> Result<Record, BuildError>
@@ -77,6 +113,7 @@ where
     );
     let builder = Builder::<R, C> {
         params: params.canonical(),
+        reserved_levels,
         block_shift: params.sah_block_shift(),
         isa: Isa::best(),
         cutting: corners
@@ -215,6 +252,7 @@ type BuildSubtree<B> = fn(&B, Range<'_>, Slots<'_>, &mut Memory, u32) -> Result<
 
 struct Builder<R, C> {
     params: BuildParams,
+    reserved_levels: u32,
     block_shift: u32,
     isa: Isa,
     /// How primitives are cut, if they are.
@@ -304,7 +342,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<R, C> {
         level: u32,
     ) -> Result<Record, BuildError> {
         let n = range.len();
-        let at_limit = level + RESERVED_LEVELS >= self.params.max_depth;
+        let at_limit = level + self.reserved_levels >= self.params.max_depth;
         if n <= self.params.min_leaf_size as usize || at_limit {
             range.sort::<R>();
             return self.leaf_phase(range, slots, memory, level);

@@ -242,7 +242,7 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
             }
             let first = mapping.bins_of::<R>(reference.0.lower());
             let last = mapping.bins_of::<R>(reference.0.upper());
-            let mut corners = None;
+            let mut triangle = None;
             for axis in 0..3 {
                 if scale[axis] == 0.0 {
                     continue;
@@ -254,8 +254,11 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                     bins.bounds[axis][first].extend(&reference.0);
                     continue;
                 }
-                let corners = *corners.get_or_insert_with(|| self.corners_of(reference));
-                chop::<L>(bins, mapping, axis, (first, last), reference, &corners);
+                if triangle.is_none() {
+                    triangle = Some(Triangle::<L>::new(&self.corners_of(reference)));
+                }
+                let Some(triangle) = &triangle else { continue };
+                chop::<L>(bins, mapping, axis, (first, last), reference, triangle);
             }
         }
     }
@@ -282,7 +285,8 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                 continue;
             }
             let corners = self.corners_of(&reference);
-            let [left, right] = Cutter::<f32x8>::new(&corners, split.axis)
+            let [left, right] = Triangle::<f32x8>::new(&corners)
+                .across(split.axis)
                 .cut(position, f32x8::of(&reference.0))
                 .map(BoxLanes::to_bounds);
             if left.is_empty() || right.is_empty() {
@@ -335,6 +339,154 @@ impl SpatialSplit {
     }
 }
 
+/// A triangle, prepared for being cut by planes across any axis. Points are boxes of one point.
+///
+/// Edges run from each corner to the next: rounding depends on their direction. Closures are
+/// spelled out here: one that were not inlined would lose the instruction set.
+struct Triangle<L> {
+    corners: [L; 3],
+    directions: [L; 3],
+    coordinates: [[f32; 4]; 3],
+    /// 1 / direction; 0 where an edge does not cross the axis.
+    reciprocals: [[f32; 4]; 3],
+}
+
+impl<L: Halves> Triangle<L> {
+    #[inline(always)]
+    fn new([a, b, c]: &[Vec3; 3]) -> Self {
+        let corners = [L::of_point(*a), L::of_point(*b), L::of_point(*c)];
+        let [a, b, c] = [lanes(a), lanes(b), lanes(c)];
+        Self {
+            directions: [
+                corners[1].sub(corners[0]),
+                corners[2].sub(corners[1]),
+                corners[0].sub(corners[2]),
+            ],
+            corners,
+            coordinates: [a.to_array(), b.to_array(), c.to_array()],
+            reciprocals: [
+                finite_reciprocal(b - a).to_array(),
+                finite_reciprocal(c - b).to_array(),
+                finite_reciprocal(a - c).to_array(),
+            ],
+        }
+    }
+
+    /// Makes ready for planes across an axis.
+    #[inline(always)]
+    fn across(&self, axis: usize) -> Cutter<'_, L> {
+        let axis = axis & 3;
+        let heights = [
+            self.coordinates[0][axis],
+            self.coordinates[1][axis],
+            self.coordinates[2][axis],
+        ];
+        // Sorted by counting, since nobody can predict the order.
+        let [a, b, c] = heights;
+        let mut order = [0; 4];
+        order[usize::from(b < a) + usize::from(c < a)] = 0;
+        order[usize::from(a <= b) + usize::from(c < b)] = 1;
+        order[usize::from(a <= c) + usize::from(b <= c)] = 2;
+        let [low, middle, high, _] = order;
+        let [a, b, c] = [self.corners[low], self.corners[middle], self.corners[high]];
+        // The edge opposite to a corner begins at the next one.
+        const NEXT: [usize; 3] = [1, 2, 0];
+        let long = NEXT[middle];
+        Cutter {
+            triangle: self,
+            axis,
+            heights: [heights[low], heights[middle], heights[high]],
+            below: [a, a.min(b), a.min(b)],
+            above: [b.min(c), c, b.min(c)],
+            long,
+            short: [NEXT[high], NEXT[low], long],
+            ends: [a, c],
+        }
+    }
+
+    /// Where an edge crosses a plane.
+    #[inline(always)]
+    fn crossing(&self, edge: usize, axis: usize, position: f32) -> L {
+        let t = (position - self.coordinates[edge][axis]) * self.reciprocals[edge][axis];
+        L::splat(t)
+            .mul(self.directions[edge])
+            .add(self.corners[edge])
+    }
+}
+
+#[inline(always)]
+fn lanes(v: &Vec3) -> f32x4 {
+    f32x4::new([v.x, v.y, v.z, 1.0])
+}
+
+/// 1 / x, and 0 for 0.
+#[inline(always)]
+fn finite_reciprocal(x: f32x4) -> f32x4 {
+    (f32x4::ONE / x) & x.simd_ne(f32x4::ZERO)
+}
+
+/// A triangle that is cut by planes across one axis. Arrays of three are for planes below the
+/// middle corner, above it, and at its height.
+struct Cutter<'a, L> {
+    triangle: &'a Triangle<L>,
+    axis: usize,
+    /// From the lowest corner to the highest.
+    heights: [f32; 3],
+    /// The corners on the lower side.
+    below: [L; 3],
+    /// The corners on the upper side.
+    above: [L; 3],
+    /// The edge from the lowest corner to the highest.
+    long: usize,
+    /// The other edge that the plane crosses; the long one again where there is none.
+    short: [usize; 3],
+    /// The lowest and the highest corner.
+    ends: [L; 2],
+}
+
+impl<L: Halves> Cutter<'_, L> {
+    /// The boxes of the two parts of the triangle on both sides of a plane, within `bounds`.
+    #[inline(always)]
+    fn cut(&self, position: f32, bounds: L) -> [L; 2] {
+        let [low, middle, high] = self.heights;
+        let place = usize::from(middle < position) + 2 * usize::from(middle == position);
+        let (mut left, mut right) = (self.below[place], self.above[place]);
+        if low < position && position < high {
+            let long = self.triangle.crossing(self.long, self.axis, position);
+            let short = self
+                .triangle
+                .crossing(self.short[place], self.axis, position);
+            let crossing = long.min(short);
+            left = left.min(crossing);
+            right = right.min(crossing);
+        } else {
+            [left, right] = self.not_crossed(position, place);
+        }
+        [left.max(bounds), right.max(bounds)]
+    }
+
+    /// The sides of a plane that parts no two corners: it can only touch.
+    #[inline(always)]
+    fn not_crossed(&self, position: f32, place: usize) -> [L; 2] {
+        let [low, _, high] = self.heights;
+        let nothing = L::of(&Bounds::EMPTY);
+        let (mut left, mut right) = (nothing, nothing);
+        if high <= position {
+            left = self.below[1].min(self.ends[1]);
+            if position <= high {
+                right = self.above[place].min(self.ends[1]);
+            }
+        }
+        if position <= low {
+            right = self.above[0].min(self.ends[0]).min(right);
+            if low <= position {
+                left = self.below[place].min(self.ends[0]).min(left);
+            }
+        }
+        [left, right]
+    }
+}
+
 /// Adds a primitive that spans several bins of an axis, part by part.
 #[inline(always)]
 fn chop<L: Halves>(
@@ -343,7 +495,7 @@ fn chop<L: Halves>(
     axis: usize,
     (mut first, mut last): (usize, usize),
     reference: &PrimitiveRef,
-    corners: &[Vec3; 3],
+    triangle: &Triangle<L>,
 ) {
     let (mut begin, mut end) = (first, last);
     // The bins were found by one rounding, the planes have another.
@@ -354,129 +506,20 @@ fn chop<L: Halves>(
     while first < last && mapping.position(axis, last) >= upper {
         last -= 1;
     }
-    let cutter = Cutter::new(corners, axis);
+    let cutter = triangle.across(axis);
     let mut rest = L::of(&reference.0);
     for bin in first..last {
         let [left, right] = cutter.cut(mapping.position(axis, bin + 1), rest);
-        if left.is_empty() {
-            begin += 1;
-        }
+        begin += usize::from(left.is_empty());
         let bounds = &mut bins.bounds[axis][bin];
         *bounds = L::of(bounds).min(left).to_bounds();
         rest = right;
     }
-    if rest.is_empty() {
-        end -= 1;
-    }
+    end -= usize::from(rest.is_empty());
     bins.begins[axis][begin] += 1;
     bins.ends[axis][end] += 1;
     let bounds = &mut bins.bounds[axis][last];
     *bounds = L::of(bounds).min(rest).to_bounds();
-}
-
-/// A triangle that is cut by planes across one axis. Points are boxes of one point.
-struct Cutter<L> {
-    /// From the lowest corner to the highest on the axis.
-    corners: [L; 3],
-    heights: [f32; 3],
-    /// From lowest to highest, lowest to middle, middle to highest.
-    edges: [Edge<L>; 3],
-}
-
-/// An edge, in the direction in which the triangle has it: rounding depends on it.
-struct Edge<L> {
-    start: L,
-    direction: L,
-    start_height: f32,
-    per_height: f32,
-}
-
-impl<L: Halves> Edge<L> {
-    #[inline(always)]
-    fn new(corners: &[L; 3], heights: &[f32; 3], a: usize, b: usize) -> Self {
-        // Edges run from each corner to the next.
-        let (from, to) = if (a + 1) % 3 == b { (a, b) } else { (b, a) };
-        Self {
-            start: corners[from],
-            direction: corners[to].sub(corners[from]),
-            start_height: heights[from],
-            per_height: 1.0 / (heights[to] - heights[from]),
-        }
-    }
-
-    /// Where the edge crosses a plane.
-    #[inline(always)]
-    fn at(&self, position: f32) -> L {
-        let t = (position - self.start_height) * self.per_height;
-        L::splat(t).mul(self.direction).add(self.start)
-    }
-}
-
-impl<L: Halves> Cutter<L> {
-    /// Closures are spelled out here: one that were not inlined would lose the instruction set.
-    #[inline(always)]
-    fn new([a, b, c]: &[Vec3; 3], axis: usize) -> Self {
-        let corners = [L::of_point(*a), L::of_point(*b), L::of_point(*c)];
-        let heights = [a[axis], b[axis], c[axis]];
-        let (mut low, mut middle, mut high) = (0, 1, 2);
-        if heights[middle] < heights[low] {
-            (low, middle) = (middle, low);
-        }
-        if heights[high] < heights[middle] {
-            (middle, high) = (high, middle);
-        }
-        if heights[middle] < heights[low] {
-            (low, middle) = (middle, low);
-        }
-        Self {
-            edges: [
-                Edge::new(&corners, &heights, low, high),
-                Edge::new(&corners, &heights, low, middle),
-                Edge::new(&corners, &heights, middle, high),
-            ],
-            corners: [corners[low], corners[middle], corners[high]],
-            heights: [heights[low], heights[middle], heights[high]],
-        }
-    }
-
-    /// The boxes of the two parts of the triangle on both sides of a plane, within `bounds`.
-    #[inline(always)]
-    fn cut(&self, position: f32, bounds: L) -> [L; 2] {
-        let [low, middle, high] = self.heights;
-        let (mut left, mut right) = (L::of(&Bounds::EMPTY), L::of(&Bounds::EMPTY));
-        if low <= position {
-            left = self.corners[0];
-        }
-        if position <= high {
-            right = self.corners[2];
-        }
-        if position < middle {
-            right = right.min(self.corners[1]);
-        } else if middle < position {
-            left = left.min(self.corners[1]);
-        } else {
-            left = left.min(self.corners[1]);
-            right = right.min(self.corners[1]);
-        }
-        if low < position && position < high {
-            let mut crossing = self.edges[0].at(position);
-            if position < middle {
-                crossing = crossing.min(self.edges[1].at(position));
-            } else if middle < position {
-                crossing = crossing.min(self.edges[2].at(position));
-            }
-            left = left.min(crossing);
-            right = right.min(crossing);
-        }
-        // A plane at the height of several corners; rare enough to be asked last.
-        if high <= position {
-            left = left.min(self.corners[2]);
-        }
-        if position <= low {
-            right = right.min(self.corners[0]);
-        }
-        [left.max(bounds), right.max(bounds)]
-    }
 }
 
 /// Surface area; 0 of an empty box.

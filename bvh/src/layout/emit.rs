@@ -1,12 +1,12 @@
-//! From records to nodes and triangle blocks.
+//! From records to nodes and blocks of primitives.
 //!
 //! Nodes are laid out depth first, children in ascending order of area; each subtree knows how
 //! many nodes and blocks it needs, so that threads fill disjoint slices.
 
 use super::{
-    node::{ChildRef, Node, ranks},
+    block::{BLOCK_SIZE, BlockOf, Primitives},
+    node::{ChildRef, Node, half_area, ranks},
     tree::Tree,
-    triangles::{BLOCK_SIZE, Block, Triangles},
 };
 use crate::{
     bounds::Aabb,
@@ -20,11 +20,11 @@ use crate::{
 };
 
 /// Where the parts of a finished build are found.
-pub(crate) struct Source<'a> {
+pub(crate) struct Source<'a, P> {
     pub(crate) root: Option<Record>,
     pub(crate) records: &'a [Record],
     pub(crate) leaves: &'a [LeafReference],
-    pub(crate) triangles: Triangles<'a>,
+    pub(crate) primitives: P,
 }
 
 /// Every so many records begin another cache line, or nearly so.
@@ -40,12 +40,12 @@ struct Slots<'a, const N: usize, const W: usize, B> {
     level: usize,
 }
 
-impl Source<'_> {
+impl<P: Primitives> Source<'_, P> {
     /// The tree of a build.
     ///
     /// # Errors
     /// [`BuildError::TreeTooLarge`] if references cannot number its parts.
-    pub(crate) fn emit<const N: usize, const W: usize, B: Block>(
+    pub(crate) fn emit<const N: usize, const W: usize, B: BlockOf<P>>(
         &self,
     ) -> Result<Tree<N, W, B>, BuildError> {
         let mut tree = Tree {
@@ -58,12 +58,12 @@ impl Source<'_> {
         };
         let (nodes, blocks) = (root.nodes as usize, root.blocks as usize);
         check_count("nodes", nodes, ChildRef::NODE_LIMIT)?;
-        check_count("blocks of triangles", blocks, ChildRef::BLOCK_LIMIT)?;
+        check_count("blocks of primitives", blocks, ChildRef::BLOCK_LIMIT)?;
         // A tree that is a single leaf gets a node above it, so that traversal starts the same way.
         tree.nodes.resize(nodes.max(1), Node::default());
-        tree.blocks.resize(blocks, B::new(&[], &self.triangles));
+        tree.blocks.resize(blocks, B::new(&[], &self.primitives));
         if B::INDEXED {
-            tree.points = self.triangles.points();
+            tree.points = self.primitives.points();
         }
         let slots = Slots {
             nodes: &mut tree.nodes,
@@ -79,7 +79,7 @@ impl Source<'_> {
         Ok(tree)
     }
 
-    fn children<const N: usize, const W: usize, B: Block>(
+    fn children<const N: usize, const W: usize, B: BlockOf<P>>(
         &self,
         children: &[Record],
         slots: Slots<'_, N, W, B>,
@@ -96,7 +96,7 @@ impl Source<'_> {
                 }
                 Kind::Leaf => self.leaves[child.range()]
                     .iter()
-                    .for_each(|&leaf| self.triangles.prefetch_triangle(leaf)),
+                    .for_each(|&leaf| self.primitives.prefetch_ids(leaf)),
             }
         }
         let mut area = [f32::INFINITY; N];
@@ -128,7 +128,7 @@ impl Source<'_> {
         if !B::INDEXED {
             for child in children.iter().filter(|child| child.kind == Kind::Leaf) {
                 for &leaf in &self.leaves[child.range()] {
-                    self.triangles.prefetch_vertices(leaf);
+                    self.primitives.prefetch(leaf);
                 }
             }
         }
@@ -161,7 +161,7 @@ impl Source<'_> {
         }
     }
 
-    fn child<const N: usize, const W: usize, B: Block>(
+    fn child<const N: usize, const W: usize, B: BlockOf<P>>(
         &self,
         record: &Record,
         slots: Slots<'_, N, W, B>,
@@ -173,7 +173,7 @@ impl Source<'_> {
     }
 
     /// Fills subtrees at the same time.
-    fn run<const N: usize, const W: usize, B: Block>(
+    fn run<const N: usize, const W: usize, B: BlockOf<P>>(
         &self,
         jobs: &mut [Option<(&Record, Slots<'_, N, W, B>)>],
     ) {
@@ -197,10 +197,10 @@ impl Source<'_> {
         }
     }
 
-    fn leaf<B: Block>(&self, record: &Record, blocks: &mut [B]) {
+    fn leaf<B: BlockOf<P>>(&self, record: &Record, blocks: &mut [B]) {
         let leaves = self.leaves[record.range()].chunks(BLOCK_SIZE);
         for (block, leaves) in blocks.iter_mut().zip(leaves) {
-            *block = B::new(leaves, &self.triangles);
+            *block = B::new(leaves, &self.primitives);
         }
     }
 }
@@ -217,15 +217,10 @@ fn check_count(parts: &'static str, count: usize, limit: usize) -> Result<(), Bu
     }
 }
 
-fn half_area(bounds: &Aabb) -> f32 {
-    let d = bounds.max - bounds.min;
-    d.x * (d.y + d.z) + d.y * d.z
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::triangles::EdgeBlock;
+    use crate::layout::triangles::{EdgeBlock, Triangles};
 
     /// The error of a tree that claims so many parts; nothing is allocated for it.
     fn error_of(nodes: u32, blocks: u32) -> Option<BuildError> {
@@ -237,7 +232,7 @@ mod tests {
             }),
             records: &[],
             leaves: &[],
-            triangles: Triangles {
+            primitives: Triangles {
                 meshes: &[],
                 first_ids: &[],
                 first_points: &[],
@@ -263,7 +258,7 @@ mod tests {
         );
         assert_eq!(
             error_of(1, blocks + 1),
-            too_large("blocks of triangles", (1 << 27) + 1, 1 << 27)
+            too_large("blocks of primitives", (1 << 27) + 1, 1 << 27)
         );
     }
 }

@@ -159,6 +159,12 @@ impl<const N: usize, const W: usize> Node<N, W> {
     }
 }
 
+/// Half the surface area.
+pub(super) fn half_area(bounds: &Aabb) -> f32 {
+    let d = bounds.max - bounds.min;
+    d.x * (d.y + d.z) + d.y * d.z
+}
+
 /// The place of each key in ascending order, equal keys in the order in which they come. All pairs
 /// are compared, which for so few is faster than sorting, since nothing depends on the outcome of a
 /// comparison but a sum.
@@ -178,7 +184,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::layout::triangles::BLOCK_SIZE;
+    use crate::layout::block::BLOCK_SIZE;
 
     #[test]
     fn sizes_are_whole_cache_lines() {

@@ -1,8 +1,8 @@
 //! A tree as the kernels read it.
 
 use super::{
+    block::{Block, Point},
     node::{ChildRef, Node},
-    triangles::{Block, Point},
 };
 
 /// Nodes depth first, the root first; an empty scene has no node. Coordinates are scaled by the

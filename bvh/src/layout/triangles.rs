@@ -13,20 +13,12 @@
 
 use glam::Vec3;
 
+use super::block::{BLOCK_SIZE, Block, BlockOf, NO_PRIMITIVE, Point, Primitives};
 use crate::{
     build::LeafReference,
     mesh::TriangleMesh,
     simd::{Lanes, prefetch},
 };
-
-/// How many triangles a block holds.
-pub(crate) const BLOCK_SIZE: usize = 4;
-
-/// Marks an unused lane, which no ray hits: its vectors are not a number.
-pub(crate) const NO_TRIANGLE: u32 = u32::MAX;
-
-/// A vertex in the scaled space of a tree.
-pub(crate) type Point = [f32; 3];
 
 /// The value of unused lanes. Every comparison with it fails, so that such a lane is never taken
 /// for one that needs a second look.
@@ -49,8 +41,14 @@ impl Triangles<'_> {
         self.first_ids[leaf.geometry_id as usize] + leaf.primitive_id
     }
 
+    /// The triangle with a number over all meshes.
     #[inline]
-    fn corners(&self, leaf: LeafReference) -> [Vec3; 3] {
+    pub(crate) fn locate(&self, id: u32) -> LeafReference {
+        locate(self.first_ids, id)
+    }
+
+    #[inline]
+    pub(crate) fn corners(&self, leaf: LeafReference) -> [Vec3; 3] {
         let mesh = self.meshes[leaf.geometry_id as usize];
         mesh.corners(leaf.primitive_id).map(|v| v * self.scale)
     }
@@ -62,49 +60,42 @@ impl Triangles<'_> {
         self.meshes[geometry_id].triangles()[leaf.primitive_id as usize].map(|i| first + i)
     }
 
-    /// Asks for the vertex numbers of a triangle before they are needed.
-    #[inline]
-    pub(crate) fn prefetch_triangle(&self, leaf: LeafReference) {
-        let mesh = self.meshes[leaf.geometry_id as usize];
-        prefetch(&mesh.triangles()[leaf.primitive_id as usize]);
-    }
-
-    /// Asks for the vertices of a triangle before they are needed.
-    #[inline]
-    pub(crate) fn prefetch_vertices(&self, leaf: LeafReference) {
-        let mesh = self.meshes[leaf.geometry_id as usize];
-        for index in mesh.triangles()[leaf.primitive_id as usize] {
-            prefetch(&mesh.vertices()[index as usize]);
-        }
-    }
-
-    /// All vertices, and one for the unused lanes at the end.
-    pub(crate) fn points(&self) -> Vec<Point> {
-        let vertices = self.meshes.iter().flat_map(|mesh| mesh.vertices());
-        let scaled = vertices.map(|&v| (v * self.scale).to_array());
-        scaled.chain([[UNUSED; 3]]).collect()
-    }
-
     /// The number of the point of the unused lanes.
     fn unused_point(&self) -> u32 {
         self.first_points.last().copied().unwrap_or(0)
     }
 }
 
-/// Four triangles of a leaf.
-pub(crate) trait Block: Copy + std::fmt::Debug + Send + Sync {
-    /// Whether it refers to the points of its tree.
-    const INDEXED: bool;
+/// Geometry id and primitive id of a triangle, by its number over all meshes.
+#[inline]
+pub(crate) fn locate(first_ids: &[u32], id: u32) -> LeafReference {
+    // The last mesh that begins at or before it: empty meshes begin where the next one does.
+    let geometry_id = first_ids.partition_point(|&first| first <= id) - 1;
+    LeafReference {
+        geometry_id: geometry_id as u32,
+        primitive_id: id - first_ids[geometry_id],
+    }
+}
 
-    /// Makes a block of at most [`BLOCK_SIZE`] triangles.
-    fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self;
+impl Primitives for Triangles<'_> {
+    #[inline]
+    fn prefetch_ids(&self, leaf: LeafReference) {
+        let mesh = self.meshes[leaf.geometry_id as usize];
+        prefetch(&mesh.triangles()[leaf.primitive_id as usize]);
+    }
 
-    /// Number of each triangle over all meshes, or [`NO_TRIANGLE`].
-    fn ids(&self) -> &[u32; BLOCK_SIZE];
+    #[inline]
+    fn prefetch(&self, leaf: LeafReference) {
+        let mesh = self.meshes[leaf.geometry_id as usize];
+        for index in mesh.triangles()[leaf.primitive_id as usize] {
+            prefetch(&mesh.vertices()[index as usize]);
+        }
+    }
 
-    /// How many lanes are used.
-    fn len(&self) -> usize {
-        self.ids().iter().filter(|&&id| id != NO_TRIANGLE).count()
+    fn points(&self) -> Vec<Point> {
+        let vertices = self.meshes.iter().flat_map(|mesh| mesh.vertices());
+        let scaled = vertices.map(|&v| (v * self.scale).to_array());
+        scaled.chain([[UNUSED; 3]]).collect()
     }
 }
 
@@ -149,7 +140,7 @@ pub(crate) struct IndexBlock {
 }
 
 fn ids_of(leaves: &[LeafReference], triangles: &Triangles<'_>) -> [u32; BLOCK_SIZE] {
-    let mut ids = [NO_TRIANGLE; BLOCK_SIZE];
+    let mut ids = [NO_PRIMITIVE; BLOCK_SIZE];
     for (id, &leaf) in ids.iter_mut().zip(leaves) {
         *id = triangles.id(leaf);
     }
@@ -196,6 +187,13 @@ fn load<L: Lanes<4>>([x, y, z]: &Rows) -> [L; 3] {
 impl Block for EdgeBlock {
     const INDEXED: bool = false;
 
+    #[inline(always)]
+    fn ids(&self) -> &[u32; BLOCK_SIZE] {
+        &self.id
+    }
+}
+
+impl BlockOf<Triangles<'_>> for EdgeBlock {
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
         let [a, b, c] = corners_of(leaves, triangles).each_ref().map(rows);
         Self {
@@ -204,11 +202,6 @@ impl Block for EdgeBlock {
             edge_2: difference_of(&c, &a),
             id: ids_of(leaves, triangles),
         }
-    }
-
-    #[inline(always)]
-    fn ids(&self) -> &[u32; BLOCK_SIZE] {
-        &self.id
     }
 }
 
@@ -222,16 +215,18 @@ impl WithEdges for EdgeBlock {
 impl Block for CornerBlock {
     const INDEXED: bool = false;
 
+    #[inline(always)]
+    fn ids(&self) -> &[u32; BLOCK_SIZE] {
+        &self.id
+    }
+}
+
+impl BlockOf<Triangles<'_>> for CornerBlock {
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
         Self {
             corners: corners_of(leaves, triangles).each_ref().map(rows),
             id: ids_of(leaves, triangles),
         }
-    }
-
-    #[inline(always)]
-    fn ids(&self) -> &[u32; BLOCK_SIZE] {
-        &self.id
     }
 }
 
@@ -250,6 +245,13 @@ impl WithCorners for CornerBlock {
 impl Block for IndexBlock {
     const INDEXED: bool = true;
 
+    #[inline(always)]
+    fn ids(&self) -> &[u32; BLOCK_SIZE] {
+        &self.id
+    }
+}
+
+impl BlockOf<Triangles<'_>> for IndexBlock {
     fn new(leaves: &[LeafReference], triangles: &Triangles<'_>) -> Self {
         let mut points = [[triangles.unused_point(); BLOCK_SIZE]; 3];
         for (lane, &leaf) in leaves.iter().enumerate().take(BLOCK_SIZE) {
@@ -261,11 +263,6 @@ impl Block for IndexBlock {
             points,
             id: ids_of(leaves, triangles),
         }
-    }
-
-    #[inline(always)]
-    fn ids(&self) -> &[u32; BLOCK_SIZE] {
-        &self.id
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
 #[cfg(target_arch = "x86_64")]
 use super::{avx2, avx512};
 use crate::{
-    layout::{tree::Tree, triangles::Block},
+    layout::{block::Block, tree::Tree},
     traverse::{
         kernel::{self, Candidate, Count, RaySetup},
         triangle::TriangleTest,
@@ -112,10 +112,31 @@ where
     }
 }
 
-/// The two entries of an instruction set.
+/// Tells all hits of a ray with a tree, in no certain order.
+#[inline]
+pub(crate) fn all<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
+    isa: Isa,
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    visit: impl FnMut(Candidate),
+) where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx2 => unsafe { all_avx2::<N, W, B, A, _>(tree, ray, visit) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx512 => unsafe { all_avx512::<N, W, B, A, _>(tree, ray, visit) },
+        _ => kernel::all::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(tree, ray, visit),
+    }
+}
+
+/// The three entries of an instruction set.
 #[cfg(target_arch = "x86_64")]
 macro_rules! entries {
-    ($closest:ident, $any:ident, $lanes:ident, $features:literal) => {
+    ($closest:ident, $any:ident, $all:ident, $lanes:ident, $features:literal) => {
         #[target_feature(enable = $features)]
         fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
             tree: &Tree<N, W, B>,
@@ -143,6 +164,18 @@ macro_rules! entries {
                 tree, ray, count,
             )
         }
+
+        #[target_feature(enable = $features)]
+        fn $all<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, F>(
+            tree: &Tree<N, W, B>,
+            ray: &RaySetup,
+            visit: F,
+        ) where
+            Widths: Width<N>,
+            F: FnMut(Candidate),
+        {
+            kernel::all::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(tree, ray, visit);
+        }
     };
 }
 
@@ -150,6 +183,7 @@ macro_rules! entries {
 entries!(
     closest_avx2,
     any_avx2,
+    all_avx2,
     Avx2,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
 );
@@ -158,6 +192,7 @@ entries!(
 entries!(
     closest_avx512,
     any_avx512,
+    all_avx512,
     Avx512,
     "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"
 );

@@ -13,7 +13,7 @@ use super::{
     triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
 };
 use crate::{
-    layout::triangles::{Point, WithEdges},
+    layout::{block::Point, triangles::WithEdges},
     simd::{Lanes, splat_all},
 };
 

@@ -18,9 +18,9 @@ use glam::Vec3;
 use super::triangle::{BlockHits, NODE_PAD, TriangleTest};
 use crate::{
     layout::{
+        block::Block,
         node::{ChildRef, Node},
         tree::Tree,
-        triangles::Block,
     },
     ray::{Ray, Work},
     simd::{Lanes, splat_all, stack::Stack},
@@ -409,4 +409,65 @@ pub(crate) fn any<
         }
     }
     false
+}
+
+/// Tells every hit, in no certain order. A primitive that was cut is told once per part.
+#[inline(always)]
+pub(crate) fn all<
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: Lanes<N>,
+    T: Lanes<4>,
+>(
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    mut visit: impl FnMut(Candidate),
+) {
+    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let prepared = A::prepare::<T>(ray);
+    let mut stack = Stack::<N>::new();
+    stack.push_if(
+        u32::from(!tree.nodes.is_empty()),
+        ChildRef::inner(0).0,
+        ray.t_min,
+    );
+    while let Some((reference, _)) = stack.pop() {
+        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            ray.t_max,
+            order,
+            &mut stack,
+            &mut (),
+        ) else {
+            continue;
+        };
+        for block in &tree.blocks[leaf.blocks()] {
+            let hits = A::test(ray, &prepared, block, &tree.points, ray.t_max);
+            let mut lanes = hits.mask;
+            if lanes == 0 {
+                continue;
+            }
+            let (t, u, v, den) = (
+                hits.t.store(),
+                hits.u.store(),
+                hits.v.store(),
+                hits.den.store(),
+            );
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize & 3;
+                lanes &= lanes - 1;
+                visit(Candidate {
+                    t: t[lane],
+                    u: u[lane] / den[lane],
+                    v: v[lane] / den[lane],
+                    id: block.ids()[lane],
+                });
+            }
+        }
+    }
 }

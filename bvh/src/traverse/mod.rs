@@ -1,5 +1,6 @@
 //! From rays to hits: the kernels, the triangle tests, and the slow twin that both answer to.
 
+pub(crate) mod box_test;
 pub(crate) mod fast;
 pub(crate) mod kernel;
 pub mod reference;

@@ -9,7 +9,8 @@ use super::{
     triangle::UNIT_ROUNDOFF,
 };
 use crate::{
-    Accuracy,
+    Aabb, Accuracy,
+    boxes::{self, BoxHit},
     bvh::{bounds_of, first_ids, hit_of, scale_of},
     error::BuildError,
     mesh::TriangleMesh,
@@ -53,6 +54,34 @@ pub fn closest_hit(
         }
     }
     Ok(best.map(|best| hit_of(&best, &setup, &first_ids)))
+}
+
+/// All boxes that a ray enters, as [`BoxBvh::intervals`](crate::BoxBvh::intervals) gives them, by
+/// testing every box.
+///
+/// # Errors
+/// As [`BoxBvh::build`](crate::BoxBvh::build), for the same boxes.
+pub fn box_intervals(boxes: &[Aabb], ray: &Ray) -> Result<Vec<BoxHit>, BuildError> {
+    let scale = scale_of(&boxes::check(boxes)?)?;
+    let Some(ray) = RaySetup::new(ray, scale) else {
+        return Ok(vec![]);
+    };
+    let mut hits = Vec::new();
+    for (id, bounds) in (0..).zip(boxes) {
+        let (mut t, mut u) = (ray.t_min, ray.t_max);
+        for axis in 0..3 {
+            let at = |plane: f32| (plane * scale - ray.origin[axis]) * ray.reciprocal[axis];
+            let (low, high) = (at(bounds.min[axis]), at(bounds.max[axis]));
+            let pad = ray.margin[axis] * (8.0 * UNIT_ROUNDOFF);
+            t = t.max(low.min(high) - pad);
+            u = u.min(low.max(high) + pad);
+        }
+        if t <= u {
+            hits.push(BoxHit::new(&Candidate { t, u, v: 0.0, id }, &ray));
+        }
+    }
+    hits.sort_by(BoxHit::order);
+    Ok(hits)
 }
 
 /// Distance and weights of vertices 1 and 2 where the ray meets a triangle.

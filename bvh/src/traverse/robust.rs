@@ -25,7 +25,7 @@ use super::{
     triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
 };
 use crate::{
-    layout::triangles::{Point, WithCorners},
+    layout::{block::Point, triangles::WithCorners},
     simd::{Lanes, splat_all},
 };
 

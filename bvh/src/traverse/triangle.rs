@@ -19,7 +19,7 @@
 //! adds what its planes are off by, `robust` has a larger margin than m·|r|.)
 
 use super::kernel::RaySetup;
-use crate::{layout::triangles::Point, simd::Lanes};
+use crate::{layout::block::Point, simd::Lanes};
 
 /// Half an ulp of 1: the unit roundoff of f32.
 pub(crate) const UNIT_ROUNDOFF: f32 = 1.0 / (1 << 24) as f32;

@@ -1,0 +1,377 @@
+//! From a binary tree to one of wide nodes and larger leaves, at the least cost by the surface area
+//! heuristic that any such tree has: Ylitie, Karras, Laine, *Efficient Incoherent Ray Traversal on
+//! GPUs Through Compressed Wide BVHs*, 2017, section 3.
+//!
+//! C(n, i), the least cost of the primitives below n as at most i trees, follows from those of the
+//! children l and r, w being the branching factor and A the half area:
+//!
+//! * leaf(n) = A(n) · intersection cost · blocks of n
+//! * C(n, 1) = min(leaf(n), A(n) · traversal cost + min over k of C(l, k) + C(r, w − k))
+//! * C(n, i) = min(C(n, i − 1), min over k of C(l, k) + C(r, i − k))
+//!
+//! They are found from the leaves up; the choices are found again from the root down. Invariants:
+//! the references below a node stay together; at most `max_leaf_size` of them make a leaf, and
+//! `min_leaf_size` or fewer always do; no level is deeper than `max_depth`: where only
+//! [`RESERVED_LEVELS`] are left and the binary tree might not fit, its leaves are halved by number.
+
+use super::{
+    BuildWorkspace, LeafReference,
+    binary::{Below, BinaryTree, ROOT},
+    primitive::Bounds,
+    record::Record,
+    recursion::{MAX_CHILDREN, RESERVED_LEVELS, depth_error},
+};
+use crate::{error::BuildError, params::BuildParams};
+
+/// The memory of a collapse.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    extents: Vec<Extent>,
+    /// C(n, 1), C(n, 2) … C(n, w − 1) of all nodes.
+    costs: Vec<f32>,
+    /// The leaf references in the order of the binary tree.
+    leaves: Vec<LeafReference>,
+    /// Binary leaves that are halved by number.
+    halved: Vec<u32>,
+}
+
+impl Memory {
+    pub(crate) fn bytes(&self) -> usize {
+        self.extents.capacity() * size_of::<Extent>()
+            + self.costs.capacity() * size_of::<f32>()
+            + self.leaves.capacity() * size_of::<LeafReference>()
+            + self.halved.capacity() * size_of::<u32>()
+    }
+}
+
+/// What is below a binary node.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    /// Place of the first reference in [`Memory::leaves`].
+    first: u32,
+    references: u32,
+    /// Nodes of the subtree, which is a range of nodes.
+    nodes: u32,
+    /// Levels that its wide tree has at most.
+    levels: u32,
+}
+
+/// Collapses the binary tree of records below `root`, the leaves of which have at most
+/// `max_leaf_size` references. Returns the new root.
+pub(crate) fn collapse(
+    workspace: &mut BuildWorkspace,
+    root: &Record,
+    params: &BuildParams,
+) -> Result<Record, BuildError> {
+    workspace.binary.load(&workspace.records, root);
+    collapse_loaded(workspace, params)
+}
+
+/// The same for the tree in `workspace.binary`, which is in preorder.
+pub(crate) fn collapse_loaded(
+    workspace: &mut BuildWorkspace,
+    params: &BuildParams,
+) -> Result<Record, BuildError> {
+    let params = params.canonical();
+    let model = Model {
+        width: params.branching_factor as usize,
+        block_shift: params.sah_block_shift(),
+        params,
+    };
+    let Memory {
+        extents,
+        costs,
+        leaves,
+        halved,
+    } = &mut workspace.collapse;
+    in_order_of_the_tree(&workspace.binary, &workspace.leaves, leaves);
+    workspace.leaves[..leaves.len()].copy_from_slice(leaves);
+    model.measure(&workspace.binary, extents, costs);
+    let most = 2 * leaves.len() - 2;
+    if workspace.records.len() < most {
+        workspace.records.resize(most, Record::UNUSED);
+    }
+    halved.clear();
+    let mut emission = Emission {
+        model,
+        tree: &workspace.binary,
+        extents,
+        costs,
+        leaves: &mut workspace.leaves,
+        records: &mut workspace.records,
+        used: 0,
+        halved,
+    };
+    emission.subtree(ROOT, 1)
+}
+
+/// Copies the references of the leaves in the order of the nodes.
+fn in_order_of_the_tree(tree: &BinaryTree, from: &[LeafReference], to: &mut Vec<LeafReference>) {
+    to.clear();
+    for node in &tree.nodes {
+        if let Below::Leaf { first, count } = node.below {
+            to.extend_from_slice(&from[first as usize..][..count as usize]);
+        }
+    }
+}
+
+/// Parameters in the form in which costs need them.
+struct Model {
+    params: BuildParams,
+    width: usize,
+    block_shift: u32,
+}
+
+impl Model {
+    fn leaf_cost(&self, area: f32, references: u32) -> f32 {
+        let blocks = (references + (1 << self.block_shift) - 1) >> self.block_shift;
+        self.params.intersection_cost * (area * blocks as f32)
+    }
+
+    /// The costs C(n, 1) … of a node.
+    fn costs<'a>(&self, costs: &'a [f32], node: u32) -> &'a [f32] {
+        let places = self.width - 1;
+        &costs[node as usize * places..][..places]
+    }
+
+    /// The least cost of two subtrees as `trees` ≥ 2 trees together, and how many of them the left
+    /// one becomes.
+    fn divided(&self, left: &[f32], right: &[f32], trees: usize) -> (f32, usize) {
+        let mut best = (left[0] + right[trees - 2], 1);
+        for of_left in 2..trees {
+            let cost = left[of_left - 1] + right[trees - 1 - of_left];
+            if cost < best.0 {
+                best = (cost, of_left);
+            }
+        }
+        best
+    }
+
+    /// Whether a subtree of so many references becomes a leaf, if the alternative costs so much.
+    /// Written so that costs that are not numbers never forbid or demand what limits do.
+    fn is_leaf(&self, area: f32, references: u32, otherwise: f32) -> bool {
+        references <= self.params.min_leaf_size
+            || references <= self.params.max_leaf_size
+                && self.leaf_cost(area, references) <= otherwise
+    }
+
+    fn node_cost(&self, area: f32, left: &[f32], right: &[f32]) -> f32 {
+        self.params.traversal_cost * area + self.divided(left, right, self.width).0
+    }
+
+    /// Fills in extents and costs.
+    fn measure(&self, tree: &BinaryTree, extents: &mut Vec<Extent>, costs: &mut Vec<f32>) {
+        let (n, places) = (tree.nodes.len(), self.width - 1);
+        let unknown = Extent {
+            first: 0,
+            references: 0,
+            nodes: 1,
+            levels: 1,
+        };
+        extents.clear();
+        extents.resize(n, unknown);
+        costs.resize(n * places, 0.0);
+        for (index, node) in tree.nodes.iter().enumerate().rev() {
+            let (own, later) = costs[index * places..].split_at_mut(places);
+            let Below::Children([left, right]) = node.below else {
+                if let Below::Leaf { count, .. } = node.below {
+                    extents[index].references = count;
+                    own.fill(self.leaf_cost(node.area, count));
+                }
+                continue;
+            };
+            let (l, r) = (extents[left as usize], extents[right as usize]);
+            let references = l.references + r.references;
+            extents[index] = Extent {
+                references,
+                nodes: 1 + l.nodes + r.nodes,
+                levels: 1 + l.levels.max(r.levels),
+                ..unknown
+            };
+            if references <= self.params.min_leaf_size {
+                extents[index].levels = 1;
+                own.fill(self.leaf_cost(node.area, references));
+                continue;
+            }
+            let child = |child: u32| &later[(child as usize - index - 1) * places..][..places];
+            let (l, r) = (child(left), child(right));
+            own[0] = self.node_cost(node.area, l, r);
+            if self.is_leaf(node.area, references, own[0]) {
+                own[0] = self.leaf_cost(node.area, references);
+            }
+            for trees in 2..=places {
+                let (cost, _) = self.divided(l, r, trees);
+                let fewer = own[trees - 2];
+                own[trees - 1] = if cost < fewer { cost } else { fewer };
+            }
+        }
+        let mut next = 0;
+        for (extent, node) in extents.iter_mut().zip(&tree.nodes) {
+            extent.first = next;
+            if let Below::Leaf { count, .. } = node.below {
+                next += count;
+            }
+        }
+    }
+}
+
+/// What is needed to write the wide tree.
+struct Emission<'a> {
+    model: Model,
+    tree: &'a BinaryTree,
+    extents: &'a [Extent],
+    costs: &'a [f32],
+    leaves: &'a mut [LeafReference],
+    records: &'a mut [Record],
+    /// Records that are taken.
+    used: usize,
+    halved: &'a mut Vec<u32>,
+}
+
+/// The nodes that become the children of a wide node.
+#[derive(Default)]
+struct Children {
+    nodes: [u32; MAX_CHILDREN],
+    len: usize,
+}
+
+impl Emission<'_> {
+    fn subtree(&mut self, index: u32, level: u32) -> Result<Record, BuildError> {
+        let params = &self.model.params;
+        let (node, extent) = (
+            &self.tree.nodes[index as usize],
+            self.extents[index as usize],
+        );
+        let Below::Children([left, right]) = node.below else {
+            return Ok(self.leaf(&node.bounds, extent.first, extent.references));
+        };
+        let (l, r) = (
+            self.model.costs(self.costs, left),
+            self.model.costs(self.costs, right),
+        );
+        let node_cost = self.model.node_cost(node.area, l, r);
+        if self.model.is_leaf(node.area, extent.references, node_cost) {
+            return Ok(self.leaf(&node.bounds, extent.first, extent.references));
+        }
+        if level + RESERVED_LEVELS >= params.max_depth
+            && level + extent.levels > params.max_depth + 1
+        {
+            let begin = self.halved.len();
+            let subtree = index..index + extent.nodes;
+            let is_leaf =
+                |&index: &u32| matches!(self.tree.nodes[index as usize].below, Below::Leaf { .. });
+            self.halved.extend(subtree.filter(is_leaf));
+            let record = self.halves(begin..self.halved.len(), level);
+            self.halved.truncate(begin);
+            return record;
+        }
+        let mut children = Children::default();
+        let (_, of_left) = self.model.divided(l, r, self.model.width);
+        self.gather(left, of_left, &mut children);
+        self.gather(right, self.model.width - of_left, &mut children);
+        let first = self.take_records(children.len);
+        for (place, &child) in (first..).zip(&children.nodes[..children.len]) {
+            self.records[place] = self.subtree(child, level + 1)?;
+        }
+        Ok(Record::inner_around(
+            first,
+            &self.records[first..first + children.len],
+        ))
+    }
+
+    /// Adds what a node as at most `trees` trees consists of. Calls itself less than
+    /// [`MAX_CHILDREN`] times deep, since both sides get fewer trees.
+    fn gather(&self, index: u32, mut trees: usize, children: &mut Children) {
+        let node = &self.tree.nodes[index as usize];
+        let divisible = self.extents[index as usize].references > self.model.params.min_leaf_size;
+        if let (Below::Children([left, right]), true) = (node.below, divisible) {
+            let own = self.model.costs(self.costs, index);
+            let (l, r) = (
+                self.model.costs(self.costs, left),
+                self.model.costs(self.costs, right),
+            );
+            while trees > 1 {
+                let (cost, of_left) = self.model.divided(l, r, trees);
+                if cost < own[trees - 2] {
+                    self.gather(left, of_left, children);
+                    self.gather(right, trees - of_left, children);
+                    return;
+                }
+                trees -= 1;
+            }
+        }
+        children.nodes[children.len] = index;
+        children.len += 1;
+    }
+
+    fn take_records(&mut self, count: usize) -> usize {
+        let first = self.used;
+        self.used += count;
+        first
+    }
+
+    /// A leaf: sorted, and what was cut and came together again stored once.
+    fn leaf(&mut self, bounds: &Bounds, first: u32, count: u32) -> Record {
+        let leaf = &mut self.leaves[first as usize..][..count as usize];
+        leaf.sort_unstable_by_key(|leaf| (leaf.primitive_id, leaf.geometry_id));
+        let mut distinct = 1;
+        for place in 1..leaf.len() {
+            if leaf[place] != leaf[distinct - 1] {
+                leaf[distinct] = leaf[place];
+                distinct += 1;
+            }
+        }
+        Record::leaf(bounds, first as usize, distinct)
+    }
+
+    /// The tree over a range of [`Self::halved`], halved by number again and again.
+    fn halves(&mut self, range: std::ops::Range<usize>, level: u32) -> Result<Record, BuildError> {
+        let params = &self.model.params;
+        let (max_leaf_size, width) = (params.max_leaf_size, self.model.width);
+        let references = self.references(&range);
+        if level > params.max_depth {
+            return Err(depth_error(params, references as usize, level));
+        }
+        if references <= max_leaf_size {
+            let mut bounds = Bounds::EMPTY;
+            for &index in &self.halved[range.clone()] {
+                bounds.extend(&self.tree.nodes[index as usize].bounds);
+            }
+            let first = self.extents[self.halved[range.start] as usize].first;
+            return Ok(self.leaf(&bounds, first, references));
+        }
+        let mut parts = [const { 0..0 }; MAX_CHILDREN];
+        parts[0] = range;
+        let mut len = 1;
+        while len < width {
+            // No leaf of the binary tree is too large, so that what is too large has two or more.
+            let too_large = |part: &usize| self.references(&parts[*part]) > max_leaf_size;
+            let Some(most) = (0..len)
+                .filter(too_large)
+                .max_by_key(|&part| parts[part].len())
+            else {
+                break;
+            };
+            let std::ops::Range { start, end } = parts[most];
+            let middle = start.midpoint(end);
+            parts[most] = start..middle;
+            parts[len] = middle..end;
+            len += 1;
+        }
+        let first = self.take_records(len);
+        for (place, part) in (first..).zip(parts).take(len) {
+            self.records[place] = self.halves(part, level + 1)?;
+        }
+        Ok(Record::inner_around(
+            first,
+            &self.records[first..first + len],
+        ))
+    }
+
+    /// How many references a range of [`Self::halved`] has.
+    fn references(&self, range: &std::ops::Range<usize>) -> u32 {
+        let [first, last] =
+            [range.start, range.end - 1].map(|place| self.extents[self.halved[place] as usize]);
+        last.first + last.references - first.first
+    }
+}

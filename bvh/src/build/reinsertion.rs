@@ -1,0 +1,271 @@
+//! Optimisation of a binary tree by moving subtrees to better places: Bittner, Hapala, Havran,
+//! *Fast Insertion-Based Optimization of Bounding Volume Hierarchies*, 2013, searched for many
+//! nodes at the same time as in Meister, Bittner, *Parallel Reinsertion for Bounding Volume
+//! Hierarchy Optimization*, 2018.
+//!
+//! A node X is moved to T by taking it and its parent P out, so that its sibling takes the place of
+//! P, and putting P back between T and the parent of T, with X and T as children. The sum of the
+//! areas of inner nodes, to which the surface area cost is proportional while the leaves stay as
+//! they are, changes by the areas of P before and after and of the nodes that shrink and grow.
+//!
+//! For a batch of nodes the best T is searched in a tree that nobody changes; then the moves are
+//! made one after the other, and one that does not pay any more after those before it is taken
+//! back. Invariants: the result does not depend on threads; the sum of areas never grows; the
+//! leaves stay the same; the root stays node 0 and its children stay below it unless their siblings
+//! move; nothing deeper than [`DEEPEST`] is moved or gets a new sibling, which bounds the time of a
+//! search for any tree.
+
+use super::{
+    binary::{Below, BinaryTree, Node, ROOT},
+    primitive::Bounds,
+    tasks,
+};
+
+/// The most rounds, and the share of the areas that a round must gain for another one.
+const ROUNDS: usize = 3;
+const LEAST_GAIN: f64 = 0.005;
+
+/// Nodes whose moves are searched in the same tree. Enough for several threads, few enough that
+/// most moves still pay when their turn comes.
+const BATCH: usize = 1 << 16;
+
+/// Steps to the root beyond which nodes stay where they are.
+const DEEPEST: usize = 256;
+
+/// Places that a search keeps in mind; it forgets those beyond.
+const STACK: usize = 128;
+
+/// A move that may pay.
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    from: u32,
+    to: u32,
+}
+
+/// The memory of an optimisation.
+#[derive(Debug, Default)]
+pub(crate) struct Memory {
+    /// The order of the candidates: the largest first. Inverted area above, index below.
+    keys: Vec<u64>,
+    moves: Vec<Move>,
+}
+
+impl Memory {
+    pub(crate) fn bytes(&self) -> usize {
+        self.keys.capacity() * size_of::<u64>() + self.moves.capacity() * size_of::<Move>()
+    }
+}
+
+/// Optimises a tree, which is and will be in preorder.
+pub(crate) fn optimize(tree: &mut BinaryTree, memory: &mut Memory) {
+    for _ in 0..ROUNDS {
+        let total = sum_of_areas(tree);
+        let gain = round(tree, memory);
+        tree.sort();
+        // Written so that sums that are not numbers end it.
+        if !(gain >= LEAST_GAIN * total) {
+            break;
+        }
+    }
+}
+
+/// The areas of the inner nodes.
+fn sum_of_areas(tree: &BinaryTree) -> f64 {
+    tree.nodes
+        .iter()
+        .filter(|node| matches!(node.below, Below::Children(_)))
+        .map(|node| f64::from(node.area))
+        .sum()
+}
+
+/// Tries to move every node once; returns by how much the sum of areas shrank.
+fn round(tree: &mut BinaryTree, memory: &mut Memory) -> f64 {
+    let Memory { keys, moves } = memory;
+    keys.clear();
+    keys.extend((0..).zip(&tree.nodes).map(|(index, node): (u32, _)| {
+        // Areas are not negative, so that their bits are in the order of their values.
+        u64::from(!node.area.to_bits()) << 32 | u64::from(index)
+    }));
+    keys.sort_unstable();
+    let mut gain = 0.0;
+    for batch in keys.chunks(BATCH) {
+        moves.clear();
+        moves.extend(batch.iter().map(|&key| Move {
+            from: key as u32,
+            to: key as u32,
+        }));
+        tasks::for_each_piece(moves, &|piece| {
+            for candidate in piece {
+                candidate.to = best_place(&tree.nodes, candidate.from);
+            }
+        });
+        for candidate in moves
+            .iter()
+            .filter(|candidate| candidate.to != candidate.from)
+        {
+            gain += reinsert(&mut tree.nodes, candidate);
+        }
+    }
+    gain
+}
+
+fn united(a: &Bounds, b: &Bounds) -> Bounds {
+    let mut bounds = *a;
+    bounds.extend(b);
+    bounds
+}
+
+/// The other child of the parent of a node that is not the root.
+fn sibling(nodes: &[Node], index: u32) -> u32 {
+    match nodes[nodes[index as usize].parent as usize].below {
+        Below::Children([left, right]) if left == index => right,
+        Below::Children([left, _]) => left,
+        Below::Leaf { .. } => index,
+    }
+}
+
+/// Where a node costs least; the node itself if that is where it is.
+fn best_place(nodes: &[Node], from: u32) -> u32 {
+    let node = &nodes[from as usize];
+    let parent = node.parent;
+    if parent == ROOT {
+        return from;
+    }
+    let mut best = (0.0, from);
+    let mut stack = [(0.0_f32, 0_u32); STACK];
+    // What is gained above by taking the node and its parent out.
+    let mut saved = nodes[parent as usize].area;
+    let mut other = sibling(nodes, from);
+    // The box that the ancestor below `pivot` will have.
+    let mut shrunk = nodes[other as usize].bounds;
+    let mut pivot = parent;
+    for _ in 0..DEEPEST {
+        // Below `pivot`, on the other side of where the node is.
+        stack[0] = (saved, other);
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (saved, to) = stack[top];
+            // The new parent is at least as large as the node.
+            if !(saved - node.area > best.0) {
+                continue;
+            }
+            let target = &nodes[to as usize];
+            let gain = saved - united(&target.bounds, &node.bounds).half_area();
+            if gain > best.0 && to != other_of(parent, pivot, other) {
+                best = (gain, to);
+            }
+            if let Below::Children(children) = target.below {
+                let saved = gain + target.area;
+                if saved - node.area > best.0 {
+                    for child in children {
+                        if top < STACK {
+                            stack[top] = (saved, child);
+                            top += 1;
+                        }
+                    }
+                }
+            }
+        }
+        if pivot == ROOT {
+            break;
+        }
+        if pivot != parent {
+            shrunk.extend(&nodes[other as usize].bounds);
+            saved += nodes[pivot as usize].area - shrunk.half_area();
+        }
+        other = sibling(nodes, pivot);
+        pivot = nodes[pivot as usize].parent;
+    }
+    best.1
+}
+
+/// The sibling while the search is below the node's own parent: to put the node there changes
+/// nothing. Otherwise no node.
+fn other_of(parent: u32, pivot: u32, other: u32) -> u32 {
+    if pivot == parent { other } else { u32::MAX }
+}
+
+/// Makes a move if it still can be made and pays; returns by how much the sum of areas shrank.
+fn reinsert(nodes: &mut [Node], &Move { from, to }: &Move) -> f64 {
+    let parent = nodes[from as usize].parent;
+    let back = sibling(nodes, from);
+    if parent == ROOT || to == parent || to == back || !is_outside(nodes, from, to) {
+        return 0.0;
+    }
+    let gain = take_out(nodes, from, parent, back) + put_in(nodes, from, parent, to);
+    if gain > 0.0 {
+        return gain;
+    }
+    let now = sibling(nodes, from);
+    take_out(nodes, from, parent, now);
+    put_in(nodes, from, parent, back);
+    0.0
+}
+
+/// Whether `to` is neither the root nor below `from` nor too deep.
+fn is_outside(nodes: &[Node], from: u32, to: u32) -> bool {
+    let mut above = to;
+    for _ in 0..DEEPEST {
+        if above == from {
+            return false;
+        }
+        if above == ROOT {
+            return to != ROOT;
+        }
+        above = nodes[above as usize].parent;
+    }
+    false
+}
+
+/// Puts `child` where `old` is below the parent of `old`.
+fn replace(nodes: &mut [Node], old: u32, child: u32) {
+    let parent = nodes[old as usize].parent;
+    nodes[child as usize].parent = parent;
+    if let Below::Children(children) = &mut nodes[parent as usize].below {
+        let place = usize::from(children[0] != old);
+        children[place] = child;
+    }
+}
+
+/// Takes a node and its parent out; its sibling takes the place of the parent. Returns by how much
+/// the sum of areas shrank.
+fn take_out(nodes: &mut [Node], _from: u32, parent: u32, sibling: u32) -> f64 {
+    replace(nodes, parent, sibling);
+    f64::from(nodes[parent as usize].area) + refit(nodes, nodes[sibling as usize].parent)
+}
+
+/// Puts a node and its parent in at `to`, which becomes its sibling. Returns by how much the sum of
+/// areas shrank.
+fn put_in(nodes: &mut [Node], from: u32, parent: u32, to: u32) -> f64 {
+    replace(nodes, to, parent);
+    nodes[to as usize].parent = parent;
+    let bounds = united(&nodes[to as usize].bounds, &nodes[from as usize].bounds);
+    let node = &mut nodes[parent as usize];
+    node.below = Below::Children([to, from]);
+    node.bounds = bounds;
+    node.area = bounds.half_area();
+    refit(nodes, nodes[parent as usize].parent) - f64::from(nodes[parent as usize].area)
+}
+
+/// Makes the boxes from a node up to the root those of their children, until one already is.
+/// Returns by how much the sum of areas shrank.
+fn refit(nodes: &mut [Node], mut index: u32) -> f64 {
+    let mut gain = 0.0;
+    while let Below::Children([left, right]) = nodes[index as usize].below {
+        let bounds = united(&nodes[left as usize].bounds, &nodes[right as usize].bounds);
+        let node = &mut nodes[index as usize];
+        if bounds.0 == node.bounds.0 {
+            break;
+        }
+        let area = bounds.half_area();
+        gain += f64::from(node.area) - f64::from(area);
+        node.bounds = bounds;
+        node.area = area;
+        if index == ROOT {
+            break;
+        }
+        index = node.parent;
+    }
+    gain
+}
