@@ -8,7 +8,8 @@
 //! through both. Embree is found as `raywright_validation::embree` says; without it, nothing is
 //! compared and no goal is judged.
 //!
-//! Method: rounds in turns, the first dropped, median and quartiles of the ratio within a round.
+//! Method: rounds in turns, the first dropped, median and quartiles of the ratio within a round;
+//! what is timed follows an untimed run of its own kind. A row "again" shows the noise.
 //! One thread: CPU time of the process for builds, of the thread for rays. Two threads: wall time,
 //! builds only, no goals. Embree's number of threads acts on a whole process, so each number has a
 //! process of its own.

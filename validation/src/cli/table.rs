@@ -66,6 +66,11 @@ impl Table {
             .any(|row| row.unordered + row.different > 0)
     }
 
+    /// Whether no line was counted.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
     /// Prints the rows under a title.
     pub(crate) fn print(&self, title: &str) {
         println!("\n{title}");

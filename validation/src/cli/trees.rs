@@ -85,10 +85,17 @@ pub(crate) fn run(args: &TreesArgs) -> Result<Verdict, Box<dyn Error>> {
         let folder = run.folder.display();
         return Err(format!("no golden trees in {folder}; name their folder by --data").into());
     }
-    let tables = [run.steps()?, run.debug_trees()?, run.lines("sets.jsonl")?];
-    let scenes = [run.lines("scenes.jsonl")?, run.scene_level()?];
-    let differs = tables.iter().chain(&scenes).any(|differs| *differs);
-    Ok(if differs {
+    let generator_differs = run.steps()?;
+    let tables = [
+        run.debug_trees()?,
+        run.lines("sets.jsonl")?,
+        run.lines("scenes.jsonl")?,
+        run.scene_level()?,
+    ];
+    if tables.iter().all(Table::is_empty) {
+        return Err("no golden line has such a --set and --quality: nothing was compared".into());
+    }
+    Ok(if generator_differs || tables.iter().any(Table::differs) {
         Verdict::SomethingDiffers
     } else {
         Verdict::AllEqual
@@ -135,20 +142,22 @@ impl Run<'_> {
     fn steps(&self) -> Result<bool, Box<dyn Error>> {
         let steps: Vec<Steps> = read_lines(&self.folder.join("debug_steps.jsonl"))?;
         let mut wrong = Vec::new();
+        let mut compared = 0;
         for step in steps.iter().filter(|step| self.wants_set(&step.set)) {
+            compared += 1;
             let set = self.set(&step.set)?;
             if Fnv::of_vertices(&set.triangles) != step.vertices_hash {
                 wrong.push(step.set.as_str());
             }
         }
-        println!("debug_steps.jsonl: vertices of {} sets", steps.len());
+        println!("debug_steps.jsonl: vertices of {compared} sets");
         if !wrong.is_empty() {
             println!("  the generator is wrong for {}", wrong.join(", "));
         }
         Ok(!wrong.is_empty())
     }
 
-    fn debug_trees(&self) -> Result<bool, Box<dyn Error>> {
+    fn debug_trees(&self) -> Result<Table, Box<dyn Error>> {
         let lines: Vec<DebugTree> = read_lines(&self.folder.join("debug_trees.jsonl"))?;
         let mut table = Table::default();
         let mut workspace = BuildWorkspace::default();
@@ -164,10 +173,10 @@ impl Run<'_> {
             });
         }
         table.print("debug_trees.jsonl");
-        Ok(table.differs())
+        Ok(table)
     }
 
-    fn lines(&self, file: &str) -> Result<bool, Box<dyn Error>> {
+    fn lines(&self, file: &str) -> Result<Table, Box<dyn Error>> {
         let lines: Vec<Line> = read_lines(&self.folder.join(file))?;
         let mut table = Table::default();
         let mut workspace = BuildWorkspace::default();
@@ -187,10 +196,10 @@ impl Run<'_> {
             }
         }
         table.print(file);
-        Ok(table.differs())
+        Ok(table)
     }
 
-    fn scene_level(&self) -> Result<bool, Box<dyn Error>> {
+    fn scene_level(&self) -> Result<Table, Box<dyn Error>> {
         let lines: Vec<SceneLevel> = read_lines(&self.folder.join("scene_level.jsonl"))?;
         let mut table = Table::default();
         let mut workspace = BuildWorkspace::default();
@@ -237,7 +246,7 @@ impl Run<'_> {
             }
         }
         table.print("scene_level.jsonl (rows by what is built)");
-        Ok(table.differs())
+        Ok(table)
     }
 }
 
