@@ -599,7 +599,7 @@ mod tests {
     #[test]
     fn all_faults_are_reported_at_once() {
         let params = BuildParams {
-            quality: Quality::Optimized,
+            quality: Quality::Agglomerative,
             branching_factor: 17,
             max_depth: 0,
             sah_block_size: 0,
@@ -617,14 +617,14 @@ mod tests {
     #[test]
     fn what_is_not_built_yet_is_named() {
         let params = BuildParams {
-            quality: Quality::Optimized,
+            quality: Quality::Agglomerative,
             ..BuildParams::default()
         };
         assert!(matches!(
             params.faults()[..],
             [ParameterFault::NotBuiltYet {
                 name: "quality",
-                value: "optimized",
+                value: "agglomerative",
                 ..
             }]
         ));

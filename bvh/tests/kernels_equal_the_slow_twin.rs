@@ -107,6 +107,7 @@ fn params() -> impl Strategy<Value = BuildParams> {
             Quality::Morton,
             Quality::BinnedSah,
             Quality::SpatialSplits,
+            Quality::Optimized,
         ]),
     )
         .prop_map(

@@ -122,3 +122,90 @@ impl BinaryTree {
         }
     }
 }
+
+/// Which binary tree a test wants.
+#[cfg(test)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Shape {
+    /// Neighbours, drawn at random, are united again and again.
+    Random,
+    /// Every right child is a leaf.
+    Chain,
+}
+
+/// A binary tree over leaves of one or two references in random boxes: the root, the records, the
+/// references.
+#[cfg(test)]
+pub(crate) fn random_tree(
+    leaves: usize,
+    seed: u64,
+    shape: Shape,
+) -> (Record, Vec<Record>, Vec<super::LeafReference>) {
+    let mut state = seed;
+    // Knuth's linear congruential generator.
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 24) as f32
+    };
+    let mut references = Vec::new();
+    let mut trees = Vec::new();
+    for _ in 0..leaves {
+        let corner = glam::Vec3::from([random(), random(), random()]);
+        let size = glam::Vec3::from([random(), random(), random()]) * 0.2;
+        let bounds = Bounds::of_aabb(&crate::Aabb {
+            min: corner,
+            max: corner + size,
+        });
+        let (first, count) = (references.len(), 1 + usize::from(random() < 0.5));
+        references.extend((0..count).map(|place| super::LeafReference {
+            geometry_id: 0,
+            primitive_id: (first + place) as u32,
+        }));
+        trees.push(Record::leaf(&bounds, first, count));
+    }
+    let mut records = Vec::new();
+    while trees.len() > 1 {
+        let place = match shape {
+            Shape::Random => (random() * (trees.len() - 1) as f32) as usize,
+            Shape::Chain => 0,
+        };
+        let children = [trees.remove(place), trees[place]];
+        trees[place] = Record::inner_around(records.len(), &children);
+        records.extend(children);
+    }
+    (trees[0], records, references)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loaded_and_sorted_trees_are_in_preorder() {
+        for (leaves, shape) in [
+            (1, Shape::Random),
+            (2, Shape::Random),
+            (99, Shape::Random),
+            (50, Shape::Chain),
+        ] {
+            let (root, records, _) = random_tree(leaves, 1, shape);
+            let mut tree = BinaryTree::default();
+            tree.load(&records, &root);
+            assert_eq!(tree.nodes.len(), 2 * leaves - 1);
+            let before: Vec<_> = tree.nodes.iter().map(|n| (n.parent, n.below)).collect();
+            for (index, node) in (0..).zip(&tree.nodes) {
+                if let Below::Children([left, right]) = node.below {
+                    assert_eq!(left, index + 1);
+                    assert!(right > left);
+                    assert_eq!(tree.nodes[left as usize].parent, index);
+                    assert_eq!(tree.nodes[right as usize].parent, index);
+                }
+            }
+            tree.sort();
+            let after: Vec<_> = tree.nodes.iter().map(|n| (n.parent, n.below)).collect();
+            assert_eq!(before, after);
+        }
+    }
+}

@@ -21,13 +21,24 @@ use super::{
     tasks,
 };
 
-/// The most rounds, and the share of the areas that a round must gain for another one.
+/// The most rounds, and the share of the areas that a round must gain for another one. On Sponza
+/// three rounds gain 10 %, 3 % and 0.7 %.
 const ROUNDS: usize = 3;
 const LEAST_GAIN: f64 = 0.005;
 
+/// One of so many nodes is moved, the largest first: a tenth of them brings nine tenths of the
+/// gain of all (Sponza: 9.9 % of the areas in place of 10.9 % in the first round).
+const NODES_PER_CANDIDATE: usize = 10;
+
+/// Smaller trees have all their nodes moved.
+const SMALL_TREE: usize = 4096;
+
 /// Nodes whose moves are searched in the same tree. Enough for several threads, few enough that
 /// most moves still pay when their turn comes.
-const BATCH: usize = 1 << 16;
+const BATCH: usize = 1 << 13;
+
+/// Nodes that one thread searches for at a time.
+const SEARCHES: usize = 1 << 9;
 
 /// Steps to the root beyond which nodes stay where they are.
 const DEEPEST: usize = 256;
@@ -62,8 +73,7 @@ pub(crate) fn optimize(tree: &mut BinaryTree, memory: &mut Memory) {
         let total = sum_of_areas(tree);
         let gain = round(tree, memory);
         tree.sort();
-        // Written so that sums that are not numbers end it.
-        if !(gain >= LEAST_GAIN * total) {
+        if gain < LEAST_GAIN * total {
             break;
         }
     }
@@ -86,15 +96,20 @@ fn round(tree: &mut BinaryTree, memory: &mut Memory) -> f64 {
         // Areas are not negative, so that their bits are in the order of their values.
         u64::from(!node.area.to_bits()) << 32 | u64::from(index)
     }));
-    keys.sort_unstable();
+    let count = (keys.len() / NODES_PER_CANDIDATE).max(keys.len().min(SMALL_TREE));
+    if count < keys.len() {
+        keys.select_nth_unstable(count);
+    }
+    let candidates = &mut keys[..count];
+    candidates.sort_unstable();
     let mut gain = 0.0;
-    for batch in keys.chunks(BATCH) {
+    for batch in candidates.chunks(BATCH) {
         moves.clear();
         moves.extend(batch.iter().map(|&key| Move {
             from: key as u32,
             to: key as u32,
         }));
-        tasks::for_each_piece(moves, &|piece| {
+        tasks::for_each_piece_of(moves, SEARCHES, &|piece: &mut [Move]| {
             for candidate in piece {
                 candidate.to = best_place(&tree.nodes, candidate.from);
             }
@@ -147,12 +162,13 @@ fn best_place(nodes: &[Node], from: u32) -> u32 {
             top -= 1;
             let (saved, to) = stack[top];
             // The new parent is at least as large as the node.
-            if !(saved - node.area > best.0) {
+            if saved - node.area <= best.0 {
                 continue;
             }
             let target = &nodes[to as usize];
             let gain = saved - united(&target.bounds, &node.bounds).half_area();
-            if gain > best.0 && to != other_of(parent, pivot, other) {
+            // Beside its sibling is where the node is.
+            if gain > best.0 && (to != other || pivot != parent) {
                 best = (gain, to);
             }
             if let Below::Children(children) = target.below {
@@ -171,19 +187,19 @@ fn best_place(nodes: &[Node], from: u32) -> u32 {
             break;
         }
         if pivot != parent {
+            // Taking the node out makes an ancestor smaller; beside the ancestor, their new parent
+            // has the box that the ancestor had.
             shrunk.extend(&nodes[other as usize].bounds);
-            saved += nodes[pivot as usize].area - shrunk.half_area();
+            let area = nodes[pivot as usize].area;
+            saved += area - shrunk.half_area();
+            if saved - area > best.0 {
+                best = (saved - area, pivot);
+            }
         }
         other = sibling(nodes, pivot);
         pivot = nodes[pivot as usize].parent;
     }
     best.1
-}
-
-/// The sibling while the search is below the node's own parent: to put the node there changes
-/// nothing. Otherwise no node.
-fn other_of(parent: u32, pivot: u32, other: u32) -> u32 {
-    if pivot == parent { other } else { u32::MAX }
 }
 
 /// Makes a move if it still can be made and pays; returns by how much the sum of areas shrank.
@@ -193,12 +209,12 @@ fn reinsert(nodes: &mut [Node], &Move { from, to }: &Move) -> f64 {
     if parent == ROOT || to == parent || to == back || !is_outside(nodes, from, to) {
         return 0.0;
     }
-    let gain = take_out(nodes, from, parent, back) + put_in(nodes, from, parent, to);
+    let gain = take_out(nodes, parent, back) + put_in(nodes, from, parent, to);
     if gain > 0.0 {
         return gain;
     }
     let now = sibling(nodes, from);
-    take_out(nodes, from, parent, now);
+    take_out(nodes, parent, now);
     put_in(nodes, from, parent, back);
     0.0
 }
@@ -230,7 +246,7 @@ fn replace(nodes: &mut [Node], old: u32, child: u32) {
 
 /// Takes a node and its parent out; its sibling takes the place of the parent. Returns by how much
 /// the sum of areas shrank.
-fn take_out(nodes: &mut [Node], _from: u32, parent: u32, sibling: u32) -> f64 {
+fn take_out(nodes: &mut [Node], parent: u32, sibling: u32) -> f64 {
     replace(nodes, parent, sibling);
     f64::from(nodes[parent as usize].area) + refit(nodes, nodes[sibling as usize].parent)
 }
@@ -268,4 +284,88 @@ fn refit(nodes: &mut [Node], mut index: u32) -> f64 {
         index = node.parent;
     }
     gain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::binary::{Shape, random_tree},
+        *,
+    };
+
+    fn tree(leaves: usize, seed: u64, shape: Shape) -> BinaryTree {
+        let (root, records, _) = random_tree(leaves, seed, shape);
+        let mut tree = BinaryTree::default();
+        tree.load(&records, &root);
+        tree
+    }
+
+    /// The leaves; checks links and boxes.
+    fn leaves(tree: &BinaryTree) -> Vec<(u32, u32)> {
+        let mut leaves = Vec::new();
+        for (index, node) in (0..).zip(&tree.nodes) {
+            match node.below {
+                Below::Leaf { first, count } => leaves.push((first, count)),
+                Below::Children([left, right]) => {
+                    let [l, r] = [left, right].map(|child| &tree.nodes[child as usize]);
+                    assert_eq!((left, l.parent, r.parent), (index + 1, index, index));
+                    assert_eq!(node.bounds.0, united(&l.bounds, &r.bounds).0);
+                    assert_eq!(node.area, node.bounds.half_area());
+                }
+            }
+        }
+        leaves.sort_unstable();
+        leaves
+    }
+
+    #[test]
+    fn areas_never_grow_and_leaves_stay() {
+        for seed in 0..200 {
+            let shape = if seed % 2 == 0 {
+                Shape::Random
+            } else {
+                Shape::Chain
+            };
+            let mut tree = tree(1 + seed as usize * 3, seed, shape);
+            let (before, area) = (leaves(&tree), sum_of_areas(&tree));
+            optimize(&mut tree, &mut Memory::default());
+            assert_eq!(leaves(&tree), before);
+            let after = sum_of_areas(&tree);
+            assert!(after <= area * (1.0 + 1e-12), "{after} {area}");
+            // Trees without any order are far from good.
+            if seed > 50 {
+                assert!(after < 0.7 * area, "{after} {area}");
+            }
+        }
+    }
+
+    /// The search against trying every place, by the areas that the tree then has.
+    #[test]
+    fn the_best_place_is_found() {
+        for seed in 0..40 {
+            let tree = tree(12, seed, Shape::Random);
+            let area = sum_of_areas(&tree);
+            let gain_of = |from, to| {
+                let mut nodes = tree.nodes.clone();
+                let gain = reinsert(&mut nodes, &Move { from, to });
+                let mut changed = BinaryTree::default();
+                changed.nodes = nodes;
+                let difference = area - sum_of_areas(&changed);
+                assert!((gain - difference).abs() < 1e-5, "{gain} {difference}");
+                gain
+            };
+            for from in 1..tree.nodes.len() as u32 {
+                let best = (1..tree.nodes.len() as u32)
+                    .map(|to| gain_of(from, to))
+                    .fold(0.0, f64::max);
+                let found = best_place(&tree.nodes, from);
+                let gain = if found == from {
+                    0.0
+                } else {
+                    gain_of(from, found)
+                };
+                assert!((best - gain).abs() < 1e-5, "{seed} {from}: {best} {gain}");
+            }
+        }
+    }
 }

@@ -63,13 +63,22 @@ pub(crate) fn map_merge<T: Sync, R: Send>(
 
 /// Treats the items piece by piece.
 pub(crate) fn for_each_piece<T: Send>(items: &mut [T], treat: &(impl Fn(&mut [T]) + Sync)) {
-    if items.len() <= PIECE_SIZE {
+    for_each_piece_of(items, PIECE_SIZE, treat);
+}
+
+/// Treats the items in pieces of at most `size`, which is not 0.
+pub(crate) fn for_each_piece_of<T: Send>(
+    items: &mut [T],
+    size: usize,
+    treat: &(impl Fn(&mut [T]) + Sync),
+) {
+    if items.len() <= size {
         return treat(items);
     }
     let (left, right) = items.split_at_mut(items.len() / 2);
     join(
-        || for_each_piece(left, treat),
-        || for_each_piece(right, treat),
+        || for_each_piece_of(left, size, treat),
+        || for_each_piece_of(right, size, treat),
     );
 }
 
