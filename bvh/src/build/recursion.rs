@@ -121,8 +121,14 @@ where
         reserved_levels,
         block_shift: params.sah_block_shift(),
         isa: Isa::best(),
-        cutting: corners
-            .map(|corners| Cutting::new(corners, &bounds.geometry, R::EMPTY_SIDE_ENDS_BUDGET)),
+        cutting: corners.map(|corners| {
+            Cutting::new::<R>(
+                corners,
+                &bounds.geometry,
+                params.sah_block_shift(),
+                Isa::best(),
+            )
+        }),
         rounding: std::marker::PhantomData,
     };
     let root = Range {
@@ -289,8 +295,6 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             bounds,
             object_sah,
             &overlap,
-            self.block_shift,
-            self.isa,
             &mut memory.spatial_bins,
         );
         spatial.map(Split::Spatial).or(object.map(Split::Object))

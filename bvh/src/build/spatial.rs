@@ -42,6 +42,8 @@ pub(crate) struct Cutting<F> {
     root_area: f32,
     /// Whether a cut with an empty side takes away the rest of the reference's budget.
     empty_side_ends_budget: bool,
+    block_shift: u32,
+    isa: Isa,
 }
 
 /// A plane between spatial bins.
@@ -152,11 +154,13 @@ impl Bins {
 }
 
 impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
-    pub(crate) fn new(corners: C, root: &Bounds, empty_side_ends_budget: bool) -> Self {
+    pub(crate) fn new<R: Rounding>(corners: C, root: &Bounds, block_shift: u32, isa: Isa) -> Self {
         Self {
+            block_shift,
+            isa,
             corners,
             root_area: 2.0 * root.half_area(),
-            empty_side_ends_budget,
+            empty_side_ends_budget: R::EMPTY_SIDE_ENDS_BUDGET,
         }
     }
 
@@ -169,8 +173,6 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         bounds: &RangeBounds,
         object_sah: f32,
         overlap: &Bounds,
-        block_shift: u32,
-        isa: Isa,
         bins: &mut Bins,
     ) -> Option<SpatialSplit> {
         let overlap_area = area(overlap);
@@ -188,7 +190,7 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                 bins,
                 rounding: std::marker::PhantomData,
             };
-            simd::build::run(isa, kernel)
+            simd::build::run(self.isa, kernel)
         };
         if tasks::in_pieces(references.len()) {
             let of_piece = |piece: &[PrimitiveRef]| {
@@ -204,7 +206,7 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         let scale = mapping.scale.to_array();
         let mut best: Option<SpatialSplit> = None;
         for axis in (0..3).filter(|&axis| scale[axis] != 0.0) {
-            let (sah, plane, count) = bins.best_plane(axis, block_shift);
+            let (sah, plane, count) = bins.best_plane(axis, self.block_shift);
             if plane != 0 && best.is_none_or(|best| sah < best.sah) {
                 best = Some(SpatialSplit {
                     axis,
