@@ -18,6 +18,8 @@ use raywright_validation::{
 };
 
 const ROUNDS: usize = 5;
+/// Of builds that take seconds and have no goal for their time.
+const FEW_ROUNDS: usize = 2;
 
 /// Quality of ours, of Embree, and the largest ratio of CPU times that meets the goal.
 const GOALS: [(Quality, BuildQuality, f64); 3] = [
@@ -126,7 +128,7 @@ impl Summary {
             if let Some(device) = device.filter(|_| threads == 1) {
                 builders.extend(api_builds(device, mesh, &primitives, embree_quality, clock));
             }
-            let times = table(&format!("{quality:?}"), &builders, clock);
+            let times = table(&format!("{quality:?}"), &builders, ROUNDS, clock);
             if device.is_none() || threads != 1 || api == ours {
                 continue;
             }
@@ -163,7 +165,7 @@ impl Summary {
                 builders.push(commit(device, mesh, BuildQuality::Medium, clock, ""));
             }
             builders.extend(super::peers::builders(mesh, clock));
-            table("other crates", &builders, clock);
+            table("other crates", &builders, ROUNDS, clock);
         }
     }
 
@@ -284,17 +286,17 @@ pub(crate) fn primitives(mesh: &TriangleMesh) -> Vec<BuildPrimitive> {
 }
 
 /// Measures and prints; the median ratio of each builder's time to that of the first.
-fn table(title: &str, builders: &[Builder<'_>], clock: Clock) -> Vec<f64> {
+fn table(title: &str, builders: &[Builder<'_>], rounds: usize, clock: Clock) -> Vec<f64> {
     if builders.is_empty() {
         return Vec::new();
     }
     // Each timed build follows one of its own kind: memory that another builder has just freed, or
     // has not, made the same Embree build differ from itself by 2.4 (dragon, Morton).
-    let turns = measure_by(builders.len(), ROUNDS, |i| {
+    let turns = measure_by(builders.len(), rounds, |i| {
         (builders[i].run)();
         (builders[i].run)()
     });
-    println!("\n{title}; {}, {ROUNDS} rounds in turns", clock.name());
+    println!("\n{title}; {}, {rounds} rounds in turns", clock.name());
     println!(
         "  {:<36}{:>10}{:>8}{:>18}{:>10}",
         "", "ms", "ratio", "quartiles", "SAH"
