@@ -14,8 +14,11 @@ use crate::error::ParameterFault;
 pub enum Quality {
     /// Along a Morton curve: fastest to build, slow to trace. Block size and costs have no effect.
     Morton,
-    /// Agglomeration of near clusters along a Morton curve: between Morton and binned SAH. Not
-    /// part of Embree.
+    /// Agglomeration of near clusters along a Morton curve: between Morton and binned SAH in time.
+    /// Block size and costs decide which subtrees become leaves; primitives within `min_leaf_size`
+    /// are united before all else, so that larger values build faster; levels are
+    /// halved only where `max_depth` would else be exceeded; the split budget and the rounding have
+    /// no effect. Not part of Embree.
     Agglomerative,
     /// Binned surface area heuristic.
     BinnedSah,
@@ -128,7 +131,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["morton", "binned-sah", "spatial-splits"],
+            &["morton", "agglomerative", "binned-sah", "spatial-splits"],
         ),
         tuned: ParameterRange::Words(
             &[
@@ -138,7 +141,7 @@ pub const PARAMETERS: [Parameter; 13] = [
                 "spatial-splits",
                 "optimized",
             ],
-            &["morton", "binned-sah", "spatial-splits"],
+            &["morton", "agglomerative", "binned-sah", "spatial-splits"],
         ),
         changes_hits: false,
         meaning: "how primitives are divided into subtrees",

@@ -9,6 +9,7 @@ use crate::{
 };
 use binning::{AsEmbree, Exact};
 
+mod agglomerative;
 pub(crate) mod binning;
 mod introsort;
 mod morton;
@@ -55,6 +56,7 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
                 recursion::build::<R>(workspace, params)
             }
         }
+        (Quality::Agglomerative, _) => agglomerative::build(workspace, params),
         (Quality::Morton, _) => morton::build::<R>(workspace, params),
         _ => recursion::build::<R>(workspace, params),
     }
@@ -78,6 +80,7 @@ pub struct BuildWorkspace {
     pub(crate) records: Vec<record::Record>,
     pub(crate) keys: Vec<u64>,
     pub(crate) keys_scratch: Vec<u64>,
+    agglomerative: agglomerative::Memory,
 }
 
 impl BuildWorkspace {
@@ -89,5 +92,6 @@ impl BuildWorkspace {
             + self.leaves.capacity() * size_of::<LeafReference>()
             + self.records.capacity() * size_of::<record::Record>()
             + (self.keys.capacity() + self.keys_scratch.capacity()) * size_of::<u64>()
+            + self.agglomerative.bytes()
     }
 }
