@@ -174,8 +174,8 @@ fn usage_errors_have_exit_code_2_and_advice() {
         (&["render", "interior", "-D", "max_dept=3"][..], "max_depth"),
         (&["render", "interior", "-D", "max_depth=99"], "1..=64"),
         (
-            &["render", "interior", "-D", "quality=agglomerative"],
-            "not built yet",
+            &["render", "interior", "-D", "quality=best"],
+            "spatial-splits",
         ),
         (&["render", "interior", "-D", "max_depth"], "NAME=VALUE"),
         (&["render", "interior", "--isa", "sse9"], "portable"),

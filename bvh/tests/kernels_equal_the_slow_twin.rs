@@ -105,6 +105,7 @@ fn params() -> impl Strategy<Value = BuildParams> {
         0f32..10.0,
         prop::sample::select(vec![
             Quality::Morton,
+            Quality::Agglomerative,
             Quality::BinnedSah,
             Quality::SpatialSplits,
             Quality::Optimized,

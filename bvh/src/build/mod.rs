@@ -9,6 +9,7 @@ use crate::{
 };
 use binning::{AsEmbree, Exact};
 
+mod agglomerative;
 mod binary;
 pub(crate) mod binning;
 mod collapse;
@@ -68,6 +69,7 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
             corners.map(|corners| (capacity, corners)),
             params,
         ),
+        (Quality::Agglomerative, _) => agglomerative::build(workspace, params),
         (Quality::Morton, _) => morton::build::<R>(workspace, params),
         (_, Some(corners)) => {
             recursion::build_with_cuts::<R, C>(workspace, params, capacity, corners)
@@ -113,6 +115,7 @@ pub struct BuildWorkspace {
     binary: binary::BinaryTree,
     reinsertion: reinsertion::Memory,
     collapse: collapse::Memory,
+    agglomerative: agglomerative::Memory,
 }
 
 impl BuildWorkspace {
@@ -127,5 +130,6 @@ impl BuildWorkspace {
             + self.binary.bytes()
             + self.reinsertion.bytes()
             + self.collapse.bytes()
+            + self.agglomerative.bytes()
     }
 }

@@ -62,6 +62,7 @@ pub(crate) fn build<R: Rounding>(
             &mut workspace.keys_scratch,
             CODE_SHIFT,
             CODE_SHIFT + 30,
+            |key| *key,
         );
     }
     let root = Range {

@@ -1,31 +1,37 @@
-//! Least significant digit radix sort of 64-bit keys by some of their upper bits: stable, three
-//! passes for 30 bits. Serial: the keys of a million primitives are sorted in some ten
-//! milliseconds, and the passes wait for memory rather than for arithmetic.
+//! Least significant digit radix sort by some bits of a key: stable, three passes for 30 bits.
+//! Serial: the keys of a million primitives are sorted in some ten milliseconds, and the passes
+//! wait for memory rather than for arithmetic.
 
 /// Bits per pass: a table of counts that stays in the first cache.
-const DIGIT_BITS: u32 = 10;
+const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
-/// Sorts `keys` by their bits from `low_bit` up to and without `high_bit`; equal ones keep their
-/// order. `scratch` is memory for a copy.
-pub(crate) fn sort(keys: &mut [u64], scratch: &mut Vec<u64>, low_bit: u32, high_bit: u32) {
-    scratch.resize(keys.len(), 0);
-    let (mut from, mut to) = (keys, &mut scratch[..]);
+/// Sorts `items` by the bits of their keys from `low_bit` up to and without `high_bit`, above which
+/// there are none; equal ones keep their order. `scratch` is memory for a copy.
+pub(crate) fn sort<T: Copy + Default>(
+    items: &mut [T],
+    scratch: &mut Vec<T>,
+    low_bit: u32,
+    high_bit: u32,
+    key: impl Fn(&T) -> u64,
+) {
+    scratch.resize(items.len(), T::default());
+    let (mut from, mut to) = (items, &mut scratch[..]);
     let mut in_scratch = false;
     let mut shift = low_bit;
     while shift < high_bit {
-        let digit = |key: u64| (key >> shift) as usize & (DIGITS - 1);
+        let digit = |item: &T| (key(item) >> shift) as usize & (DIGITS - 1);
         let mut places = [0_u32; DIGITS];
-        for &key in &*from {
-            places[digit(key)] += 1;
+        for item in &*from {
+            places[digit(item)] += 1;
         }
         let mut next = 0;
         for place in &mut places {
             next += std::mem::replace(place, next);
         }
-        for &key in &*from {
-            let place = &mut places[digit(key)];
-            to[*place as usize] = key;
+        for item in &*from {
+            let place = &mut places[digit(item)];
+            to[*place as usize] = *item;
             *place += 1;
         }
         std::mem::swap(&mut from, &mut to);
@@ -53,7 +59,7 @@ mod tests {
             let mut keys: Vec<u64> = high.zip(0..).map(|(h, i)| h << 32 | i).collect();
             let mut expected = keys.clone();
             expected.sort_by_key(|key| key >> 32);
-            sort(&mut keys, &mut Vec::new(), 32, 62);
+            sort(&mut keys, &mut Vec::new(), 32, 62, |key| *key);
             prop_assert_eq!(keys, expected);
         }
     }

@@ -82,6 +82,24 @@ pub(crate) fn for_each_piece_of<T: Send>(
     );
 }
 
+/// Treats the items piece by piece; tells of each piece where it begins, `begin` being the place of
+/// the first item.
+pub(crate) fn for_each_piece_from<T: Send>(
+    begin: usize,
+    items: &mut [T],
+    treat: &(impl Fn(usize, &mut [T]) + Sync),
+) {
+    if items.len() <= PIECE_SIZE {
+        return treat(begin, items);
+    }
+    let middle = items.len() / 2;
+    let (left, right) = items.split_at_mut(middle);
+    join(
+        || for_each_piece_from(begin, left, treat),
+        || for_each_piece_from(begin + middle, right, treat),
+    );
+}
+
 /// Fills each result from its job, at the same time where jobs are large. `memory` goes from job
 /// to job; another thread gets memory of its own. A failure of an earlier job hides those of later
 /// ones.
