@@ -155,6 +155,7 @@ impl Summary {
             table(
                 &format!("{quality:?}, not part of Embree"),
                 &builders,
+                FEW_ROUNDS,
                 clock,
             );
         }
