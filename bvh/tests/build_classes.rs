@@ -331,7 +331,8 @@ fn t18_deep_trees_keep_the_limit_and_the_hits() {
                 Err(error) => panic!("{error}"),
             }
         }
-        assert!(refused <= 1, "{name}: {refused} trees are too deep");
+        // The binary trees along the Morton curve, by Morton order and by agglomeration.
+        assert!(refused <= 2, "{name}: {refused} trees are too deep");
         assert!(deepest_level > 8, "{name} is not deep: {deepest_level}");
     }
 }

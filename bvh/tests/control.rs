@@ -97,11 +97,11 @@ fn memory_is_what_was_announced_and_a_limit_is_kept() {
             bytes.push(workspace.bytes());
         }
         assert!(
-            bytes[0] <= needed,
-            "{:?}: {} of {needed} bytes",
-            params.quality,
-            bytes[0]
+            bytes.iter().all(|&b| b <= needed),
+            "{:?}: {bytes:?} of {needed} bytes",
+            params.quality
         );
-        assert!(bytes.iter().all(|&b| b == bytes[0]), "{bytes:?}");
+        // Buffers that change places may both grow to the larger size in the second build.
+        assert!(bytes[2..].iter().all(|&b| b == bytes[1]), "{bytes:?}");
     }
 }
