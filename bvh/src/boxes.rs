@@ -108,7 +108,7 @@ impl BoxBvh {
         params.validate().map_err(BuildError::Parameters)?;
         let bounds = check(boxes)?;
         let scale = scale_of(&bounds)?;
-        workspace.references.clear();
+        workspace.begin(boxes.len(), params)?;
         workspace.references.extend(
             (0..)
                 .zip(boxes)
@@ -122,9 +122,7 @@ impl BoxBvh {
             primitives: Boxes { boxes, scale },
         };
         let tree = BoxTree::new(&source, params)?;
-        if params.dynamics == Dynamics::Static {
-            *workspace = BuildWorkspace::default();
-        }
+        workspace.end(params);
         Ok(Self {
             tree,
             scale,

@@ -99,6 +99,7 @@ impl Bvh {
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
         let first_ids = first_ids(meshes)?;
+        workspace.begin(first_ids[meshes.len()] as usize, params)?;
         let bounds = reference_all(meshes, &mut workspace.references);
         let scale = scale_of(&bounds)?;
         tasks::for_each_piece(&mut workspace.references, &|piece| {
@@ -124,9 +125,7 @@ impl Bvh {
             },
         };
         let tree = AnyTree::new(&source, params)?;
-        if params.dynamics == crate::Dynamics::Static {
-            *workspace = BuildWorkspace::default();
-        }
+        workspace.end(params);
         Ok(Self {
             tree,
             first_ids,

@@ -29,16 +29,6 @@ pub enum ParameterFault {
         /// The values allowed.
         allowed: &'static [u32],
     },
-    /// A value with a meaning that this version does not build yet.
-    #[error("{name} = {value} is not built yet; built are {built:?}")]
-    NotBuiltYet {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: &'static str,
-        /// The values that are built.
-        built: &'static [&'static str],
-    },
     /// Text that is no value of the parameter.
     #[error("{name} = {text:?} is not understood; allowed are {allowed:?}")]
     NotUnderstood {

@@ -60,18 +60,20 @@ impl Hierarchy {
         workspace: &mut BuildWorkspace,
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
-        workspace.references.clear();
+        workspace.begin(primitives.len(), params)?;
         workspace.references.extend(
             primitives
                 .iter()
                 .map(|p| PrimitiveRef::new(p.bounds, p.geometry_id, p.primitive_id)),
         );
         let root = build::build(workspace, corners, params)?;
-        Ok(Self {
+        let hierarchy = Self {
             records: workspace.records.clone(),
             leaves: workspace.leaves.clone(),
             root,
-        })
+        };
+        workspace.end(params);
+        Ok(hierarchy)
     }
 
     /// The root; `None` if there are no primitives.

@@ -4,8 +4,7 @@
 //! Tracing*.
 //!
 //! [`PARAMETERS`] is the one table of names, ranges and meanings: validation, command line and
-//! tuner read it. Invariant: a value that has no meaning here, or none yet, is an error; no value
-//! is ever ignored.
+//! tuner read it. Invariant: a value that has no meaning here is an error; no value is ever ignored.
 
 use crate::error::ParameterFault;
 
@@ -98,8 +97,8 @@ pub enum ParameterRange {
     OneOf(&'static [u32]),
     /// All finite reals from the first to the second, both included.
     Reals(f32, f32),
-    /// Words; the second list names those that are built today.
-    Words(&'static [&'static str], &'static [&'static str]),
+    /// Words.
+    Words(&'static [&'static str]),
 }
 
 /// One row of the parameter table.
@@ -117,44 +116,23 @@ pub struct Parameter {
     pub meaning: &'static str,
 }
 
+/// The qualities, from the fastest build to the fastest trace.
+const QUALITIES: [&str; 5] = [
+    "morton",
+    "agglomerative",
+    "binned-sah",
+    "spatial-splits",
+    "optimized",
+];
+
 const COST_LIMIT: f32 = 1000.0;
 
 /// The eleven parameters of the paper's Table 1 in its order, then those of this crate alone.
 pub const PARAMETERS: [Parameter; 13] = [
     Parameter {
         name: "quality",
-        range: ParameterRange::Words(
-            &[
-                "morton",
-                "agglomerative",
-                "binned-sah",
-                "spatial-splits",
-                "optimized",
-            ],
-            &[
-                "morton",
-                "agglomerative",
-                "binned-sah",
-                "spatial-splits",
-                "optimized",
-            ],
-        ),
-        tuned: ParameterRange::Words(
-            &[
-                "morton",
-                "agglomerative",
-                "binned-sah",
-                "spatial-splits",
-                "optimized",
-            ],
-            &[
-                "morton",
-                "agglomerative",
-                "binned-sah",
-                "spatial-splits",
-                "optimized",
-            ],
-        ),
+        range: ParameterRange::Words(&QUALITIES),
+        tuned: ParameterRange::Words(&QUALITIES),
         changes_hits: false,
         meaning: "how primitives are divided into subtrees",
     },
@@ -209,22 +187,22 @@ pub const PARAMETERS: [Parameter; 13] = [
     },
     Parameter {
         name: "dynamics",
-        range: ParameterRange::Words(&["dynamic", "static"], &["dynamic", "static"]),
-        tuned: ParameterRange::Words(&["dynamic", "static"], &["dynamic", "static"]),
+        range: ParameterRange::Words(&["dynamic", "static"]),
+        tuned: ParameterRange::Words(&["dynamic", "static"]),
         changes_hits: false,
         meaning: "dynamic keeps the temporary memory of a build for the next one",
     },
     Parameter {
         name: "leaf_format",
-        range: ParameterRange::Words(&["edges", "compact"], &["edges", "compact"]),
-        tuned: ParameterRange::Words(&["edges", "compact"], &["edges", "compact"]),
+        range: ParameterRange::Words(&["edges", "compact"]),
+        tuned: ParameterRange::Words(&["edges", "compact"]),
         changes_hits: false,
         meaning: "compact stores vertex indices in place of edges",
     },
     Parameter {
         name: "accuracy",
-        range: ParameterRange::Words(&["fast", "robust"], &["fast", "robust"]),
-        tuned: ParameterRange::Words(&["fast", "robust"], &["fast", "robust"]),
+        range: ParameterRange::Words(&["fast", "robust"]),
+        tuned: ParameterRange::Words(&["fast", "robust"]),
         changes_hits: true,
         meaning: "robust is watertight at edges and vertices",
     },
@@ -237,8 +215,8 @@ pub const PARAMETERS: [Parameter; 13] = [
     },
     Parameter {
         name: "rounding",
-        range: ParameterRange::Words(&["exact", "embree"], &["exact", "embree"]),
-        tuned: ParameterRange::Words(&["exact"], &["exact"]),
+        range: ParameterRange::Words(&["exact", "embree"]),
+        tuned: ParameterRange::Words(&["exact"]),
         changes_hits: false,
         meaning: "embree follows the rounding of Embree's rtcBuildBVH to the last bit",
     },
@@ -561,15 +539,6 @@ fn fault_of(parameter: &Parameter, value: ParameterValue) -> Option<ParameterFau
                 name,
                 value: v,
                 allowed,
-            })
-        }
-        (ParameterRange::Words(_, built), ParameterValue::Choice(word))
-            if !built.contains(&word) =>
-        {
-            Some(ParameterFault::NotBuiltYet {
-                name,
-                value: word,
-                built,
             })
         }
         _ => None,

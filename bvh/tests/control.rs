@@ -25,7 +25,7 @@ fn terrain(n: u32) -> TriangleMesh {
 
 fn every_quality() -> Vec<BuildParams> {
     let quality = PARAMETERS.iter().find(|p| p.name == "quality").unwrap();
-    let ParameterRange::Words(_, words) = quality.range else {
+    let ParameterRange::Words(words) = quality.range else {
         panic!("quality has words");
     };
     let params = words.iter().map(|word| {
@@ -60,23 +60,39 @@ fn progress_never_passes_the_total_and_ends_with_it() {
 fn a_cancelled_build_is_an_error_and_the_workspace_goes_on() {
     let mesh = terrain(100);
     for params in every_quality() {
-        let cancelled = Arc::new(AtomicBool::new(false));
         let mut workspace = BuildWorkspace::default();
         let old = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
-        let stop = cancelled.clone();
-        workspace.control = BuildControl {
-            cancelled: Some(cancelled.clone()),
-            // The first finished part stops the rest.
-            progress: Some(Arc::new(move |_, _| stop.store(true, Ordering::Relaxed))),
-            memory_limit: None,
-        };
-        cancelled.store(true, Ordering::Relaxed);
-        let got = Bvh::build_in(&[&mesh], &params, &mut workspace).err();
-        assert_eq!(got, Some(BuildError::Cancelled), "{:?}", params.quality);
+        // Before the build, and by the first word of progress in it.
+        for from_the_start in [true, false] {
+            let cancelled = Arc::new(AtomicBool::new(from_the_start));
+            let stop = cancelled.clone();
+            workspace.control = BuildControl {
+                cancelled: Some(cancelled),
+                progress: Some(Arc::new(move |_, _| stop.store(true, Ordering::Relaxed))),
+                memory_limit: None,
+            };
+            let got = Bvh::build_in(&[&mesh], &params, &mut workspace).err();
+            assert_eq!(got, Some(BuildError::Cancelled), "{:?}", params.quality);
+        }
         workspace.control = BuildControl::default();
         let again = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
         assert_eq!(again.stats(), old.stats());
     }
+}
+
+#[test]
+fn control_outlives_the_memory_of_a_static_build() {
+    let mesh = terrain(10);
+    let mut params = BuildParams::default();
+    params.set("dynamics", "static").unwrap();
+    let mut workspace = BuildWorkspace::default();
+    let cancelled = Arc::new(AtomicBool::new(false));
+    workspace.control.cancelled = Some(cancelled.clone());
+    Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+    assert_eq!(workspace.bytes(), 0);
+    cancelled.store(true, Ordering::Relaxed);
+    let got = Bvh::build_in(&[&mesh], &params, &mut workspace).err();
+    assert_eq!(got, Some(BuildError::Cancelled));
 }
 
 #[test]

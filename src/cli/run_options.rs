@@ -104,7 +104,7 @@ pub(crate) fn parameter_help() -> String {
                 .map(ToString::to_string)
                 .collect::<Vec<_>>()
                 .join("|"),
-            ParameterRange::Words(_, built) => built.join("|"),
+            ParameterRange::Words(words) => words.join("|"),
         };
         let value = default
             .get(parameter.name)
@@ -115,7 +115,7 @@ pub(crate) fn parameter_help() -> String {
         )
     });
     format!(
-        "BVH parameters for -D: what is built today, [default], meaning\n{}",
+        "BVH parameters for -D: values, [default], meaning\n{}",
         rows.collect::<String>()
     )
 }

@@ -1,6 +1,6 @@
 //! BVH parameters as a search space, made from the one parameter table of the tree.
 //!
-//! Searched are the parameters that change no hit, over the values that are built today.
+//! Searched are the parameters that change no hit.
 //! Invariant: every configuration of the space is valid; only `max_depth` can turn out too small,
 //! which depends on the scene.
 
@@ -108,18 +108,18 @@ fn number_text(value: Value) -> String {
     }
 }
 
-/// The words of a parameter that are built, if it has words.
+/// The words of a parameter that are searched, if it has words.
 fn word_values(name: &str) -> Option<&'static [&'static str]> {
     PARAMETERS
         .iter()
         .find(|p| p.name == name)
         .and_then(|p| match p.tuned {
-            ParameterRange::Words(_, built) => Some(built),
+            ParameterRange::Words(words) => Some(words),
             _ => None,
         })
 }
 
-/// A parameter for the search; `None` if it has a single value today. Words are numbered in the
+/// A parameter for the search; `None` if it has a single value. Words are numbered in the
 /// order of the table.
 fn param_of(parameter: &Parameter) -> Option<Param> {
     let (name, doc) = (parameter.name, parameter.meaning);
@@ -133,8 +133,8 @@ fn param_of(parameter: &Parameter) -> Option<Param> {
         ParameterRange::Reals(min, max) => {
             Param::real(name, f64::from(min)..=f64::from(max), Scale::Linear, doc)
         }
-        ParameterRange::Words(_, built) if built.len() > 1 => {
-            Param::ordinal(name, (0..built.len() as i64).collect(), doc)
+        ParameterRange::Words(words) if words.len() > 1 => {
+            Param::ordinal(name, (0..words.len() as i64).collect(), doc)
         }
         ParameterRange::Words(..) => return None,
     })

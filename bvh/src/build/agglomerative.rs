@@ -21,6 +21,7 @@ use std::ops::Range;
 
 use super::{
     BuildWorkspace, LeafReference,
+    control::BuildControl,
     primitive::{Bounds, PrimitiveRef},
     radix,
     record::Record,
@@ -184,7 +185,7 @@ pub(crate) fn build(
     sort(&mut memory.places, &mut memory.places_scratch);
     let isa = Isa::best();
     first_clusters(&model, &workspace.references, isa, memory);
-    merge_all(&model, isa, memory);
+    merge_all(&model, isa, memory, &workspace.control)?;
     workspace.leaves.resize(n, LeafReference::default());
     workspace.records.clear();
     // The root stands behind the first clusters, or is the only one of them.
@@ -482,7 +483,12 @@ fn half_area([a, b, c, d, e, f]: [f32; 6]) -> f32 {
 }
 
 /// Merges the clusters into one tree. Its root is the first node behind those of the clusters.
-fn merge_all(model: &Model, isa: Isa, memory: &mut Memory) {
+fn merge_all(
+    model: &Model,
+    isa: Isa,
+    memory: &mut Memory,
+    control: &BuildControl,
+) -> Result<(), BuildError> {
     let Memory {
         clusters,
         merged,
@@ -494,7 +500,9 @@ fn merge_all(model: &Model, isa: Isa, memory: &mut Memory) {
     let mut len = clusters.len();
     // Nodes behind this one are taken.
     let mut end = nodes.len();
+    let count = len;
     while len > 1 {
+        control.check()?;
         let choices = &mut choices[..len];
         tasks::for_each_piece_from(0, choices, &|begin, choices: &mut [i8]| {
             let clusters = &clusters[..len];
@@ -524,7 +532,11 @@ fn merge_all(model: &Model, isa: Isa, memory: &mut Memory) {
         round.merge(pieces, 0, &mut merged[..len - loss], pairs, end as u32);
         std::mem::swap(clusters, merged);
         len -= loss;
+        if let Some(progress) = &control.progress {
+            progress(count - len, count);
+        }
     }
+    Ok(())
 }
 
 /// What is needed to write the wide tree.

@@ -10,7 +10,7 @@ use std::sync::{
 use super::{BuildWorkspace, LeafReference, primitive::PrimitiveRef, record::Record};
 use crate::{
     error::BuildError,
-    params::{BuildParams, Quality},
+    params::{BuildParams, Dynamics, Quality},
 };
 
 /// Ranges of at least so many references ask whether to go on: some hundred microseconds of work.
@@ -85,18 +85,33 @@ impl BuildControl {
             _ => Ok(()),
         }
     }
-
-    /// Refuses a build over `n` primitives that needs too much memory.
-    pub(crate) fn check_memory(&self, n: usize, params: &BuildParams) -> Result<(), BuildError> {
-        let needed = BuildWorkspace::bytes_needed(n, params);
-        match self.memory_limit {
-            Some(limit) if needed > limit => Err(BuildError::MemoryLimit { needed, limit }),
-            _ => Ok(()),
-        }
-    }
 }
 
 impl BuildWorkspace {
+    /// Begins a build over `n` primitives: refuses one that is cancelled or needs too much memory,
+    /// and forgets the references of the last.
+    pub(crate) fn begin(&mut self, n: usize, params: &BuildParams) -> Result<(), BuildError> {
+        self.control.check()?;
+        let needed = Self::bytes_needed(n, params);
+        if let Some(limit) = self.control.memory_limit
+            && needed > limit
+        {
+            return Err(BuildError::MemoryLimit { needed, limit });
+        }
+        self.references.clear();
+        Ok(())
+    }
+
+    /// Ends a build: frees the memory if the next build is far away.
+    pub(crate) fn end(&mut self, params: &BuildParams) {
+        if params.dynamics == Dynamics::Static {
+            *self = Self {
+                control: self.control.clone(),
+                ..Self::default()
+            };
+        }
+    }
+
     /// Bytes that a build over `n` primitives takes in the workspace, at most; the tree itself is
     /// not counted.
     #[must_use]

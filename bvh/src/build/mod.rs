@@ -36,8 +36,6 @@ pub(crate) fn build<C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
         return Ok(None);
     }
     let n = workspace.references.len();
-    workspace.control.check()?;
-    workspace.control.check_memory(n, params)?;
     let root = match params.rounding {
         Rounding::Exact => build_rounded::<Exact, C>(workspace, corners, params),
         Rounding::Embree => build_rounded::<AsEmbree, C>(workspace, corners, params),

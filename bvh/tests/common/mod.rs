@@ -27,7 +27,7 @@ pub(crate) fn bits(hit: Option<Hit>) -> Bits {
 /// tests that ask here.
 pub(crate) fn built_qualities() -> Vec<Quality> {
     let row = PARAMETERS.iter().find(|p| p.name == "quality").unwrap();
-    let ParameterRange::Words(_, built) = row.range else {
+    let ParameterRange::Words(built) = row.range else {
         panic!("qualities are words");
     };
     let quality = |word: &&str| {
