@@ -19,7 +19,7 @@ use crate::{
         tree::Tree,
     },
     mesh::TriangleMesh,
-    params::{BuildParams, Dynamics},
+    params::BuildParams,
     ray::Ray,
     simd::{Isa, dispatch},
     stats::TreeStats,

@@ -233,7 +233,8 @@ pub struct BuildParams {
     /// 8 or 16.
     pub branching_factor: u32,
     /// Deepest level of the tree, the root being level 1; 1..=64. The last 8 levels are a reserve
-    /// in which ranges are halved without looking at costs.
+    /// in which ranges are halved without looking at costs; unless rounding is Embree's, halving
+    /// begins earlier where more levels are needed for it.
     pub max_depth: u32,
     /// Primitives that the cost model intersects at once, 1..=32; acts as the power of two below.
     pub sah_block_size: u32,

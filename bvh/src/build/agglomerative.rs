@@ -25,7 +25,7 @@ use super::{
     primitive::{Bounds, PrimitiveRef},
     radix,
     record::Record,
-    recursion::{MAX_CHILDREN, depth_error},
+    recursion::{MAX_CHILDREN, depth_error, levels_below},
     tasks::{self, PIECE_SIZE},
 };
 use crate::{
@@ -495,6 +495,7 @@ fn merge_all(
         choices,
         pieces,
         nodes,
+        ids,
         ..
     } = memory;
     let mut len = clusters.len();
@@ -533,7 +534,7 @@ fn merge_all(
         std::mem::swap(clusters, merged);
         len -= loss;
         if let Some(progress) = &control.progress {
-            progress(count - len, count);
+            progress(ids.len() * (count - len) / count, ids.len());
         }
     }
     Ok(())
@@ -558,7 +559,8 @@ impl Emission<'_> {
         let Below::Children(children) = node.below else {
             return self.by_number(index, level);
         };
-        if node.summary.is_leaf() || level + self.halved_levels(&node.summary) > params.max_depth {
+        let levels = levels_below(params, node.summary.clusters as usize);
+        if node.summary.is_leaf() || level + levels >= params.max_depth {
             return self.by_number(index, level);
         }
         let (nodes, len) = self.opened(children);
@@ -606,12 +608,6 @@ impl Emission<'_> {
             len += 1;
         }
         (nodes, len)
-    }
-
-    /// How many levels a subtree has at most if it is halved by number.
-    fn halved_levels(&self, summary: &Summary) -> u32 {
-        let halvings = summary.clusters.next_power_of_two().ilog2();
-        1 + halvings.div_ceil(self.model.params.branching_factor.ilog2())
     }
 
     fn take_records(&mut self, count: usize) -> usize {

@@ -12,15 +12,15 @@
 //!
 //! They are found from the leaves up; the choices are found again from the root down. Invariants:
 //! the references below a node stay together; at most `max_leaf_size` of them make a leaf, and
-//! `min_leaf_size` or fewer always do; no level is deeper than `max_depth`: where only
-//! [`RESERVED_LEVELS`] are left and the binary tree might not fit, its leaves are halved by number.
+//! `min_leaf_size` or fewer always do; no level is deeper than `max_depth`: where all levels that are
+//! left are needed for it and the binary tree might not fit, its leaves are halved by number.
 
 use super::{
     BuildWorkspace, LeafReference,
     binary::{Below, BinaryTree, ROOT},
     primitive::Bounds,
     record::Record,
-    recursion::{MAX_CHILDREN, RESERVED_LEVELS, depth_error},
+    recursion::{MAX_CHILDREN, depth_error, levels_below},
 };
 use crate::{error::BuildError, params::BuildParams};
 
@@ -63,23 +63,9 @@ struct Extent {
     levels: u32,
 }
 
-/// Collapses the binary tree of records below `root`, the leaves of which have at most
-/// `max_leaf_size` references. Returns the new root.
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "for builders that hand over records")
-)]
+/// Collapses the tree in `workspace.binary`, which is in preorder and the leaves of which have at
+/// most `max_leaf_size` references. Returns the new root.
 pub(crate) fn collapse(
-    workspace: &mut BuildWorkspace,
-    root: &Record,
-    params: &BuildParams,
-) -> Result<Record, BuildError> {
-    workspace.binary.load(&workspace.records, root);
-    collapse_loaded(workspace, params)
-}
-
-/// The same for the tree in `workspace.binary`, which is in preorder.
-pub(crate) fn collapse_loaded(
     workspace: &mut BuildWorkspace,
     params: &BuildParams,
 ) -> Result<Record, BuildError> {
@@ -266,7 +252,8 @@ impl Emission<'_> {
         if self.model.is_leaf(node.area, extent.references, node_cost) {
             return Ok(self.leaf(&node.bounds, extent.first, extent.references));
         }
-        if level + RESERVED_LEVELS >= params.max_depth
+        let leaves = extent.nodes.div_ceil(2) as usize;
+        if level + levels_below(params, leaves) >= params.max_depth
             && level + extent.levels > params.max_depth + 1
         {
             let begin = self.halved.len();
@@ -410,6 +397,15 @@ mod tests {
         }
     }
 
+    fn collapse_records(
+        workspace: &mut BuildWorkspace,
+        root: &Record,
+        params: &BuildParams,
+    ) -> Result<Record, BuildError> {
+        workspace.binary.load(&workspace.records, root);
+        collapse(workspace, params)
+    }
+
     /// All ways to divide what is below a node into at most `most` subtrees.
     fn divisions(
         tree: &BinaryTree,
@@ -549,7 +545,7 @@ mod tests {
             let mut tree = BinaryTree::default();
             tree.load(&workspace.records, &root);
             let expected = exhaustive(&tree, &sizes(&tree), ROOT, &params);
-            let root = collapse(&mut workspace, &root, &params).unwrap();
+            let root = collapse_records(&mut workspace, &root, &params).unwrap();
             let got = check(&workspace, &root, &params, &before);
             assert!(
                 (got / expected - 1.0).abs() < 1e-5,
@@ -569,7 +565,7 @@ mod tests {
                     };
                     let (mut workspace, root) = workspace(leaves, 7, shape);
                     let before = workspace.leaves.clone();
-                    match collapse(&mut workspace, &root, &params) {
+                    match collapse_records(&mut workspace, &root, &params) {
                         Ok(root) => {
                             check(&workspace, &root, &params, &before);
                         }
@@ -589,7 +585,7 @@ mod tests {
         let (mut workspace, root) = workspace(4, 3, Shape::Random);
         let twice = workspace.leaves[0];
         workspace.leaves.fill(twice);
-        let root = collapse(&mut workspace, &root, &params(8, 64, 64)).unwrap();
+        let root = collapse_records(&mut workspace, &root, &params(8, 64, 64)).unwrap();
         assert_eq!((root.kind, root.count, root.blocks), (Kind::Leaf, 1, 1));
         assert_eq!(workspace.leaves[0], twice);
     }
@@ -605,7 +601,7 @@ mod tests {
                 for record in &mut workspace.records {
                     record.upper = [value; 3];
                 }
-                let root = collapse(&mut workspace, &root, &params).unwrap();
+                let root = collapse_records(&mut workspace, &root, &params).unwrap();
                 check(&workspace, &root, &params, &before);
             }
         }

@@ -84,10 +84,12 @@ fn optimized<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
 ) -> Result<record::Record, BuildError> {
     let root = recursion::build_binary::<R, C>(workspace, params, cuts)?;
     workspace.binary.load(&workspace.records, &root);
-    workspace.control.check()?;
-    reinsertion::optimize(&mut workspace.binary, &mut workspace.reinsertion);
-    workspace.control.check()?;
-    collapse::collapse_loaded(workspace, params)
+    reinsertion::optimize(
+        &mut workspace.binary,
+        &mut workspace.reinsertion,
+        &workspace.control,
+    )?;
+    collapse::collapse(workspace, params)
 }
 
 /// A primitive in a leaf.

@@ -18,7 +18,7 @@ use super::{
     primitive::{Bounds, PrimitiveRef},
     radix,
     record::Record,
-    recursion::{MAX_CHILDREN, RESERVED_LEVELS, depth_error},
+    recursion::{MAX_CHILDREN, RESERVED_LEVELS, depth_error, levels_below},
     tasks,
 };
 use crate::{error::BuildError, params::BuildParams};
@@ -87,6 +87,9 @@ struct Range<'a> {
     begin: usize,
     records_begin: usize,
 }
+
+/// Builds the subtree over a range at a level, the root being level 1.
+type BuildSubtree<B> = fn(&B, Range<'_>, u32) -> Result<Record, BuildError>;
 
 struct Builder<'a, R> {
     running: Running<'a>,
@@ -163,9 +166,11 @@ impl<R: Rounding> Builder<'_, R> {
         if n >= CHECK_SIZE {
             self.running.check()?;
         }
-        if n <= self.params.min_leaf_size as usize
-            || level + RESERVED_LEVELS >= self.params.max_depth
-        {
+        let leaves = n.div_ceil(self.params.max_leaf_size as usize);
+        let at_limit = level + RESERVED_LEVELS >= self.params.max_depth
+            || !R::LIBRARY_ORDER
+                && level + levels_below(&self.params, leaves) >= self.params.max_depth;
+        if n <= self.params.min_leaf_size as usize || at_limit {
             return self.leaf_phase(range, level);
         }
         let min_leaf_size = self.params.min_leaf_size as usize;
@@ -232,32 +237,73 @@ impl<R: Rounding> Builder<'_, R> {
         range: Range<'_>,
         children: &Children,
         level: u32,
-        build: fn(&Self, Range<'_>, u32) -> Result<Record, BuildError>,
+        build: BuildSubtree<Self>,
     ) -> Result<Record, BuildError> {
         let spans = &children.spans[..children.len];
-        let (own, mut records) = range.records.split_at_mut(spans.len());
-        let mut records_begin = range.records_begin + own.len();
-        // Slices are cut off in the order of the keys, children stand in the order of the node.
+        let (first, parent) = (range.records_begin, range.keys.len());
+        let (own, records) = range.records.split_at_mut(spans.len());
+        let mut rest = Range {
+            records,
+            records_begin: first + own.len(),
+            ..range
+        };
+        if tasks::is_task(parent) {
+            self.children_in_parallel(rest, spans, own, level, build)?;
+        } else {
+            for (&(begin, n), record) in spans.iter().zip(&mut *own) {
+                let (records, others) = std::mem::take(&mut rest.records).split_at_mut(2 * n - 2);
+                let child = Range {
+                    keys: &mut rest.keys[begin..begin + n],
+                    leaves: &mut rest.leaves[begin..begin + n],
+                    records,
+                    begin: rest.begin + begin,
+                    records_begin: rest.records_begin,
+                };
+                *record = build(self, child, level + 1)?;
+                self.running.finished(n, parent);
+                rest.records = others;
+                rest.records_begin += 2 * n - 2;
+            }
+        }
+        Ok(Record::inner_around(first, own))
+    }
+
+    /// Builds children at the same time. Not inlined, since few nodes need the room on the stack.
+    #[inline(never)]
+    fn children_in_parallel(
+        &self,
+        rest: Range<'_>,
+        spans: &[(usize, usize)],
+        own: &mut [Record],
+        level: u32,
+        build: BuildSubtree<Self>,
+    ) -> Result<(), BuildError> {
+        let parent = rest.keys.len();
+        // Slices are cut off in the order of the keys, records in that of the node.
         let mut in_order: [usize; MAX_CHILDREN] = std::array::from_fn(|i| i);
         in_order[..spans.len()].sort_unstable_by_key(|&i| spans[i].0);
         let mut jobs: [Option<Range<'_>>; MAX_CHILDREN] = [const { None }; MAX_CHILDREN];
-        let (mut keys, mut leaves, mut begin) = (range.keys, range.leaves, range.begin);
+        let (mut keys, mut leaves) = (rest.keys, rest.leaves);
         for &index in &in_order[..spans.len()] {
-            let (_, n) = spans[index];
-            let (own_keys, other_keys) = keys.split_at_mut(n);
-            let (own_leaves, other_leaves) = leaves.split_at_mut(n);
-            let (own_records, other_records) = records.split_at_mut(2 * n - 2);
+            let (begin, n) = spans[index];
+            let (own_keys, own_leaves);
+            (own_keys, keys) = keys.split_at_mut(n);
+            (own_leaves, leaves) = leaves.split_at_mut(n);
             jobs[index] = Some(Range {
                 keys: own_keys,
                 leaves: own_leaves,
-                records: own_records,
-                begin,
-                records_begin,
+                records: &mut [],
+                begin: rest.begin + begin,
+                records_begin: 0,
             });
-            (keys, leaves, records) = (other_keys, other_leaves, other_records);
-            (begin, records_begin) = (begin + n, records_begin + 2 * n - 2);
         }
-        let parent = spans.iter().map(|span| span.1).sum();
+        let (mut records, mut records_begin) = (rest.records, rest.records_begin);
+        for job in jobs.iter_mut().flatten() {
+            let needed = 2 * job.keys.len() - 2;
+            (job.records, records) = records.split_at_mut(needed);
+            job.records_begin = records_begin;
+            records_begin += needed;
+        }
         tasks::fill_from_jobs(
             &mut jobs[..spans.len()],
             own,
@@ -267,8 +313,7 @@ impl<R: Rounding> Builder<'_, R> {
                 let n = range.keys.len();
                 build(self, range, level + 1).inspect(|_| self.running.finished(n, parent))
             },
-        )?;
-        Ok(Record::inner_around(range.records_begin, own))
+        )
     }
 }
 

@@ -131,39 +131,135 @@ where
         }),
         rounding: std::marker::PhantomData,
     };
-    let root = Range {
+    let root = Subtree {
         references: &mut workspace.references,
         scratch: &mut workspace.scratch,
         leaves: &mut workspace.leaves,
-        len: n,
-        begin: 0,
-        bounds,
-    };
-    let slots = Slots {
         records: &mut workspace.records,
         begin: 0,
+        records_begin: 0,
+        len: n,
+        bounds,
     };
-    builder.subtree(root, slots, &mut Memory::default(), 1)
+    builder.subtree(root, &mut Memory::default(), 1)
 }
 
-/// A range of references, with all that belongs to it alone.
-struct Range<'a> {
+/// A range of references, and all memory that belongs to the subtree over it alone.
+struct Subtree<'a> {
     /// The references, and behind them room for those that cuts make.
     references: &'a mut [PrimitiveRef],
     /// As long as `references`, between which and it large partitions go back and forth.
     scratch: &'a mut [PrimitiveRef],
     leaves: &'a mut [LeafReference],
-    /// How many references there are.
-    len: usize,
+    records: &'a mut [Record],
     /// Place of the first reference among all.
     begin: usize,
+    /// Place of the first record among all.
+    records_begin: usize,
+    /// How many references there are.
+    len: usize,
     bounds: RangeBounds,
 }
 
-/// The part of the record array that belongs to a subtree.
-struct Slots<'a> {
-    records: &'a mut [Record],
-    begin: usize,
+/// A part of the range of a subtree: a child of the node that is being made.
+#[derive(Clone, Copy)]
+struct Span {
+    /// Place of the first reference within the subtree.
+    first: usize,
+    len: usize,
+    /// How many references there is room for.
+    capacity: usize,
+    /// Whether the references are in the scratch memory.
+    in_scratch: bool,
+    bounds: RangeBounds,
+}
+
+impl Subtree<'_> {
+    fn span(&self) -> Span {
+        Span {
+            first: 0,
+            len: self.len,
+            capacity: self.references.len(),
+            in_scratch: false,
+            bounds: self.bounds,
+        }
+    }
+
+    fn references(&self, span: &Span) -> &[PrimitiveRef] {
+        let memory = if span.in_scratch {
+            &*self.scratch
+        } else {
+            &*self.references
+        };
+        &memory[span.first..span.first + span.len]
+    }
+
+    /// The memory of a span, references first.
+    fn memory(&mut self, span: &Span) -> [&mut [PrimitiveRef]; 2] {
+        let range = span.first..span.first + span.capacity;
+        let (references, scratch) = (
+            &mut self.references[range.clone()],
+            &mut self.scratch[range],
+        );
+        if span.in_scratch {
+            [scratch, references]
+        } else {
+            [references, scratch]
+        }
+    }
+
+    fn sort<R: Rounding>(&mut self, span: &Span) {
+        let references = &mut self.memory(span)[0][..span.len];
+        if R::LIBRARY_ORDER {
+            introsort::sort(references, |a, b| a.sort_key() < b.sort_key());
+        } else {
+            references.sort_unstable_by_key(PrimitiveRef::sort_key);
+        }
+    }
+
+    /// Parts a span behind `left` references. Room for cuts is shared by what each side may still
+    /// cut.
+    fn part(&mut self, span: &Span, left: usize, bounds: [RangeBounds; 2]) -> [Span; 2] {
+        let (len, room) = (span.len, span.capacity - span.len);
+        let mut right_first = left;
+        if room > 0 {
+            let [references, _] = self.memory(span);
+            let (left_side, right_side) = references[..len].split_at(left);
+            let left_room = spatial::room_of_left(left_side, right_side, room);
+            // The right side moves up; only what would be overwritten has to.
+            if left_room < len - left {
+                references.copy_within(left..left + left_room, len);
+            } else {
+                references.copy_within(left..len, left + left_room);
+            }
+            right_first += left_room;
+        }
+        [
+            Span {
+                len: left,
+                capacity: right_first,
+                bounds: bounds[0],
+                ..*span
+            },
+            Span {
+                first: span.first + right_first,
+                len: len - left,
+                capacity: span.capacity - right_first,
+                bounds: bounds[1],
+                ..*span
+            },
+        ]
+    }
+
+    /// Halves a span where it stands. The middle is taken of the absolute places, as Embree does,
+    /// so that the parity of the first place matters.
+    fn halve(&mut self, span: &Span) -> [Span; 2] {
+        let begin = self.begin + span.first;
+        let middle = (2 * begin + span.len) / 2 - begin;
+        let (left, right) = self.references(span).split_at(middle);
+        let bounds = [RangeBounds::of(left), RangeBounds::of(right)];
+        self.part(span, middle, bounds)
+    }
 }
 
 /// A way to divide a range.
@@ -181,85 +277,40 @@ impl Split {
     }
 }
 
-impl<'a> Range<'a> {
-    fn len(&self) -> usize {
-        self.len
-    }
-
-    fn references(&self) -> &[PrimitiveRef] {
-        &self.references[..self.len]
-    }
-
-    fn room(&self) -> usize {
-        self.references.len() - self.len
-    }
-
-    fn sort<R: Rounding>(&mut self) {
-        let references = &mut self.references[..self.len];
-        if R::LIBRARY_ORDER {
-            introsort::sort(references, |a, b| a.sort_key() < b.sort_key());
-        } else {
-            references.sort_unstable_by_key(PrimitiveRef::sort_key);
-        }
-    }
-
-    /// Parts the range at place `middle`. Room for cuts is shared by what each side may still cut.
-    fn split_at(self, middle: usize, bounds: [RangeBounds; 2]) -> [Self; 2] {
-        let (len, mut right_begin) = (self.len, middle);
-        if self.room() > 0 {
-            let (left, right) = self.references().split_at(middle);
-            let left_room = spatial::room_of_left(left, right, self.room());
-            // The right side moves up; only what would be overwritten has to.
-            if left_room < len - middle {
-                self.references.copy_within(middle..middle + left_room, len);
-            } else {
-                self.references.copy_within(middle..len, middle + left_room);
-            }
-            right_begin += left_room;
-        }
-        let (references, references_right) = self.references.split_at_mut(right_begin);
-        let (scratch, scratch_right) = self.scratch.split_at_mut(right_begin);
-        let (leaves, leaves_right) = self.leaves.split_at_mut(right_begin);
-        let [left, right] = bounds;
-        [
-            Self {
-                references,
-                scratch,
-                leaves,
-                len: middle,
-                begin: self.begin,
-                bounds: left,
-            },
-            Self {
-                references: references_right,
-                scratch: scratch_right,
-                leaves: leaves_right,
-                len: len - middle,
-                begin: self.begin + right_begin,
-                bounds: right,
-            },
-        ]
-    }
-
-    /// Halves the range where it stands. The middle is taken of the absolute places, as Embree
-    /// does, so that the parity of the first place matters.
-    fn halve(self) -> [Self; 2] {
-        let middle = (2 * self.begin + self.len) / 2 - self.begin;
-        let (left, right) = self.references().split_at(middle);
-        let bounds = [RangeBounds::of(left), RangeBounds::of(right)];
-        self.split_at(middle, bounds)
-    }
-}
-
 /// What is reused from range to range.
 #[derive(Default)]
 struct Memory {
     bins: binning::BinPair,
     spatial_bins: spatial::Bins,
+    /// The children of all nodes that are being made, those of the deepest node last. Here and not
+    /// on the stack, which a deep tree would else exhaust.
+    children: Vec<Span>,
 }
 
-/// Builds the subtree over a range at a level, the root being level 1.
-type BuildSubtree<B> = fn(&B, Range<'_>, Slots<'_>, &mut Memory, u32) -> Result<Record, BuildError>;
+impl Memory {
+    /// The child from `base` on with the largest value among those that qualify; ties keep the
+    /// first.
+    fn best(
+        &self,
+        base: usize,
+        qualifies: impl Fn(&Span) -> bool,
+        value: impl Fn(&Span) -> f32,
+    ) -> Option<usize> {
+        let mut best: Option<(usize, f32)> = None;
+        for (index, span) in self.children.iter().enumerate().skip(base) {
+            if qualifies(span) {
+                let value = value(span);
+                if best.is_none_or(|(_, other)| value > other) {
+                    best = Some((index, value));
+                }
+            }
+        }
+        best.map(|(index, _)| index)
+    }
+}
+
+/// Builds a subtree at a level, the root being level 1.
+type BuildSubtree<B> = fn(&B, Subtree<'_>, &mut Memory, u32) -> Result<Record, BuildError>;
 
 struct Builder<'a, R, C> {
     running: Running<'a>,
@@ -273,8 +324,9 @@ struct Builder<'a, R, C> {
 }
 
 impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
-    fn find_split(&self, range: &Range<'_>, memory: &mut Memory) -> Option<Split> {
-        let (references, bounds) = (range.references(), &range.bounds);
+    fn find_split(&self, of: &Subtree<'_>, span: &Span, memory: &mut Memory) -> Option<Split> {
+        let (references, bounds) = (of.references(span), &span.bounds);
+        let room = span.capacity - span.len;
         let object = binning::find_split::<R>(
             references,
             bounds,
@@ -282,7 +334,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             self.isa,
             &mut memory.bins,
         );
-        let Some(cutting) = self.cutting.as_ref().filter(|_| range.room() > 0) else {
+        let Some(cutting) = self.cutting.as_ref().filter(|_| room > 0) else {
             return object.map(Split::Object);
         };
         let (object_sah, overlap) = match &object {
@@ -291,7 +343,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         };
         let spatial = cutting.find_split::<R>(
             references,
-            range.room(),
+            room,
             bounds,
             object_sah,
             &overlap,
@@ -300,33 +352,32 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         spatial.map(Split::Spatial).or(object.map(Split::Object))
     }
 
-    /// Divides the range by a plane, or halves it in sorted order if there is none.
-    fn divide<'a>(&self, mut range: Range<'a>, split: Option<Split>) -> [Range<'a>; 2] {
+    /// Divides a span by a plane, or halves it in sorted order if there is none.
+    fn divide(&self, of: &mut Subtree<'_>, mut span: Span, split: Option<Split>) -> [Span; 2] {
+        let [memory, scratch] = of.memory(&span);
         let partition = match (split, &self.cutting) {
             (Some(Split::Object(split)), _) => {
-                let references = &mut range.references[..range.len];
+                let references = &mut memory[..span.len];
                 if self.cutting.is_some() && R::LIBRARY_ORDER {
                     partition::in_place(references, |reference| split.is_left(reference))
-                } else if tasks::in_pieces(range.len) {
-                    let partition =
-                        partition::into_buffer(references, range.scratch, &split, self.isa);
-                    std::mem::swap(&mut range.references, &mut range.scratch);
-                    partition
+                } else if tasks::in_pieces(span.len) {
+                    span.in_scratch = !span.in_scratch;
+                    partition::into_buffer(references, scratch, &split, self.isa)
                 } else {
-                    partition::stable(references, range.scratch, &split, self.isa)
+                    partition::stable(references, scratch, &split, self.isa)
                 }
             }
             (Some(Split::Spatial(split)), Some(cutting)) => {
-                range.len = cutting.cut::<R>(range.references, range.len, &split);
-                let references = &mut range.references[..range.len];
+                span.len = cutting.cut::<R>(memory, span.len, &split);
+                let references = &mut memory[..span.len];
                 partition::in_place(references, |reference| split.is_left::<R>(reference))
             }
             _ => {
-                range.sort::<R>();
-                return range.halve();
+                of.sort::<R>(&span);
+                return of.halve(&span);
             }
         };
-        range.split_at(partition.left, partition.bounds)
+        of.part(&span, partition.left, partition.bounds)
     }
 
     fn blocks(&self, n: usize) -> f32 {
@@ -335,138 +386,223 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
 
     /// Whether a leaf costs no more than dividing. A NaN on either side (a cost of 0 times the
     /// infinite cost of a missing plane) means that it does.
-    fn leaf_is_cheap(&self, range: &Range<'_>, split: Option<&Split>) -> bool {
-        let area = range.bounds.geometry.half_area();
+    fn leaf_is_cheap(&self, subtree: &Subtree<'_>, split: Option<&Split>) -> bool {
+        let area = subtree.bounds.geometry.half_area();
         let sah = split.map_or(f32::INFINITY, Split::sah);
-        let leaf_cost = self.params.intersection_cost * (area * self.blocks(range.len()));
+        let leaf_cost = self.params.intersection_cost * (area * self.blocks(subtree.len));
         let split_cost = self.params.traversal_cost * area + self.params.intersection_cost * sah;
         leaf_cost <= split_cost
+    }
+
+    /// Whether a range at a level must be halved without regard to cost. Embree knows only the
+    /// reserve; a range that needs more levels than that to be halved fails there.
+    fn is_at_limit(&self, n: usize, level: u32) -> bool {
+        let (params, leaves) = (&self.params, n.div_ceil(self.params.max_leaf_size as usize));
+        level + self.reserved_levels >= params.max_depth
+            || !R::LIBRARY_ORDER && level + levels_below(params, leaves) >= params.max_depth
     }
 
     /// The subtree over a range at a level, the root being level 1.
     fn subtree(
         &self,
-        mut range: Range<'_>,
-        slots: Slots<'_>,
+        mut subtree: Subtree<'_>,
         memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
-        let n = range.len();
+        let (n, span) = (subtree.len, subtree.span());
         if n >= CHECK_SIZE {
             self.running.check()?;
         }
-        let at_limit = level + self.reserved_levels >= self.params.max_depth;
-        if n <= self.params.min_leaf_size as usize || at_limit {
-            range.sort::<R>();
-            return self.leaf_phase(range, slots, memory, level);
+        let (min_leaf_size, max_leaf_size) = (
+            self.params.min_leaf_size as usize,
+            self.params.max_leaf_size as usize,
+        );
+        if n <= min_leaf_size || self.is_at_limit(n, level) {
+            subtree.sort::<R>(&span);
+            return self.leaf_phase(subtree, memory, level);
         }
-        let split = self.find_split(&range, memory);
-        if n <= self.params.max_leaf_size as usize && self.leaf_is_cheap(&range, split.as_ref()) {
-            range.sort::<R>();
-            return self.leaf_phase(range, slots, memory, level);
+        let split = self.find_split(&subtree, &span, memory);
+        if n <= max_leaf_size && self.leaf_is_cheap(&subtree, split.as_ref()) {
+            subtree.sort::<R>(&span);
+            return self.leaf_phase(subtree, memory, level);
         }
-        let bounds = range.bounds;
-        let mut children = Children::new(self.divide(range, split));
-        while children.len() < self.params.branching_factor as usize {
+        let base = memory.children.len();
+        let halves = self.divide(&mut subtree, span, split);
+        memory.children.extend(halves);
+        while memory.children.len() - base < self.params.branching_factor as usize {
             // The largest box first; ties keep the older child.
-            let Some(largest) = children.best(
-                |c| c.len() > self.params.min_leaf_size as usize,
-                |c| c.bounds.geometry.half_area(),
+            let Some(largest) = memory.best(
+                base,
+                |child| child.len > min_leaf_size,
+                |child| child.bounds.geometry.half_area(),
             ) else {
                 break;
             };
-            let child = children.take(largest);
-            let split = self.find_split(&child, memory);
-            let [left, right] = self.divide(child, split);
-            children.put(largest, left);
-            children.push(right);
+            let child = memory.children[largest];
+            let split = self.find_split(&subtree, &child, memory);
+            let [left, right] = self.divide(&mut subtree, child, split);
+            memory.children[largest] = left;
+            memory.children.push(right);
         }
-        children.sort_by_descending_size();
-        self.node(&bounds, children, slots, memory, level, Self::subtree)
+        memory.children[base..].sort_by_key(|child| std::cmp::Reverse(child.len));
+        self.node(subtree, memory, base, level, Self::subtree)
     }
 
     /// Leaves, and halving without regard to cost where too many references are left. The
     /// references of the range are sorted.
     fn leaf_phase(
         &self,
-        range: Range<'_>,
-        slots: Slots<'_>,
+        mut subtree: Subtree<'_>,
         memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
-        let n = range.len();
+        let (n, span) = (subtree.len, subtree.span());
         let max_leaf_size = self.params.max_leaf_size as usize;
         if level > self.params.max_depth {
             return Err(depth_error(&self.params, n, level));
         }
         if n <= max_leaf_size {
             let cuts = self.cutting.is_some();
-            for (leaf, reference) in range.leaves.iter_mut().zip(&range.references[..n]) {
+            for (leaf, reference) in subtree.leaves.iter_mut().zip(&subtree.references[..n]) {
                 *leaf = if cuts {
                     reference.cut_leaf_reference()
                 } else {
                     reference.leaf_reference()
                 };
             }
-            return Ok(Record::leaf(&range.bounds.geometry, range.begin, n));
+            return Ok(Record::leaf(&subtree.bounds.geometry, subtree.begin, n));
         }
-        let bounds = range.bounds;
-        let mut children = Children::new(range.halve());
-        while children.len() < self.params.branching_factor as usize {
-            let Some(largest) = children.best(|c| c.len() > max_leaf_size, |c| c.len() as f32)
-            else {
+        let base = memory.children.len();
+        memory.children.extend(subtree.halve(&span));
+        while memory.children.len() - base < self.params.branching_factor as usize {
+            let too_large = |child: &Span| child.len > max_leaf_size;
+            let Some(largest) = memory.best(base, too_large, |child| child.len as f32) else {
                 break;
             };
-            let [left, right] = children.take(largest).halve();
-            children.put_last_at(largest);
-            children.push(left);
-            children.push(right);
+            // The last child takes its place, and its halves come to the end.
+            let child = memory.children.swap_remove(largest);
+            memory.children.extend(subtree.halve(&child));
         }
-        self.node(&bounds, children, slots, memory, level, Self::leaf_phase)
+        self.node(subtree, memory, base, level, Self::leaf_phase)
     }
 
-    /// Builds the children, at the same time where they are large, and records their node.
+    /// Builds the children, which are those of the memory from `base` on, and records their node.
     fn node(
         &self,
-        bounds: &RangeBounds,
-        children: Children<'_>,
-        slots: Slots<'_>,
+        subtree: Subtree<'_>,
         memory: &mut Memory,
+        base: usize,
         level: u32,
         build: BuildSubtree<Self>,
     ) -> Result<Record, BuildError> {
-        let (own, mut rest) = slots.records.split_at_mut(children.len());
-        let mut rest_begin = slots.begin + own.len();
-        let mut jobs: [Option<(Range<'_>, Slots<'_>)>; MAX_CHILDREN] =
-            [const { None }; MAX_CHILDREN];
-        for (job, range) in jobs.iter_mut().zip(children.into_iter()) {
-            let needed = 2 * range.references.len() - 2;
-            let (records, others) = rest.split_at_mut(needed);
-            *job = Some((
-                range,
-                Slots {
-                    records,
-                    begin: rest_begin,
-                },
-            ));
-            rest = others;
-            rest_begin += needed;
+        let bounds = subtree.bounds.geometry;
+        let records_begin = subtree.records_begin;
+        let count = memory.children.len() - base;
+        let (own, rest) = subtree.records.split_at_mut(count);
+        let mut rest = Subtree {
+            records: rest,
+            records_begin: records_begin + count,
+            ..subtree
+        };
+        if tasks::is_task(rest.len) {
+            self.children_in_parallel(rest, own, memory, base, level, build)?;
+        } else {
+            for (place, record) in own.iter_mut().enumerate() {
+                let child = memory.children[base + place];
+                let (n, records) = (child.len, 2 * child.capacity - 2);
+                let range = child.first..child.first + child.capacity;
+                let (mut references, mut scratch) = (
+                    &mut rest.references[range.clone()],
+                    &mut rest.scratch[range.clone()],
+                );
+                if child.in_scratch {
+                    std::mem::swap(&mut references, &mut scratch);
+                }
+                let own = Subtree {
+                    references,
+                    scratch,
+                    leaves: &mut rest.leaves[range],
+                    records: &mut rest.records[..records],
+                    begin: rest.begin + child.first,
+                    records_begin: rest.records_begin,
+                    len: n,
+                    bounds: child.bounds,
+                };
+                *record = build(self, own, memory, level + 1)?;
+                self.running.finished(n, rest.len);
+                rest.records = &mut std::mem::take(&mut rest.records)[records..];
+                rest.records_begin += records;
+            }
         }
-        let count = own.len();
-        let parent = jobs.iter().flatten().map(|(range, _)| range.len).sum();
+        memory.children.truncate(base);
+        Ok(Record::inner(&bounds, records_begin, own))
+    }
+
+    /// Builds children at the same time. Not inlined, since few nodes need the room on the stack.
+    #[inline(never)]
+    fn children_in_parallel(
+        &self,
+        rest: Subtree<'_>,
+        own: &mut [Record],
+        memory: &mut Memory,
+        base: usize,
+        level: u32,
+        build: BuildSubtree<Self>,
+    ) -> Result<(), BuildError> {
+        let children = &memory.children[base..];
+        // Slices are cut off in the order of the references, records in that of the children.
+        let mut in_order: [usize; MAX_CHILDREN] = std::array::from_fn(|i| i);
+        in_order[..children.len()].sort_unstable_by_key(|&i| children[i].first);
+        let (mut references, mut scratch, mut leaves) =
+            (rest.references, rest.scratch, rest.leaves);
+        let mut jobs: [Option<Subtree<'_>>; MAX_CHILDREN] = [const { None }; MAX_CHILDREN];
+        for &index in &in_order[..children.len()] {
+            let child = &children[index];
+            let (mut own_references, mut own_scratch, own_leaves);
+            (own_references, references) = references.split_at_mut(child.capacity);
+            (own_scratch, scratch) = scratch.split_at_mut(child.capacity);
+            (own_leaves, leaves) = leaves.split_at_mut(child.capacity);
+            if child.in_scratch {
+                std::mem::swap(&mut own_references, &mut own_scratch);
+            }
+            jobs[index] = Some(Subtree {
+                references: own_references,
+                scratch: own_scratch,
+                leaves: own_leaves,
+                records: &mut [],
+                begin: rest.begin + child.first,
+                records_begin: 0,
+                len: child.len,
+                bounds: child.bounds,
+            });
+        }
+        let (mut records, mut records_begin) = (rest.records, rest.records_begin);
+        for job in jobs.iter_mut().flatten() {
+            let needed = 2 * job.references.len() - 2;
+            (job.records, records) = records.split_at_mut(needed);
+            job.records_begin = records_begin;
+            records_begin += needed;
+        }
+        let count = children.len();
         tasks::fill_from_jobs(
             &mut jobs[..count],
             own,
             memory,
-            &|(range, _): &(Range<'_>, Slots<'_>)| range.len,
-            &|(range, slots), memory| {
-                let n = range.len;
-                build(self, range, slots, memory, level + 1)
-                    .inspect(|_| self.running.finished(n, parent))
+            &|subtree: &Subtree<'_>| subtree.len,
+            &|subtree, memory| {
+                let n = subtree.len;
+                build(self, subtree, memory, level + 1)
+                    .inspect(|_| self.running.finished(n, rest.len))
             },
-        )?;
-        Ok(Record::inner(&bounds.geometry, slots.begin, own))
+        )
     }
+}
+
+/// How many levels there are below a node whose range of `parts` equal parts is halved into nodes.
+pub(crate) fn levels_below(params: &BuildParams, parts: usize) -> u32 {
+    // Halving fills as many equal children as the largest power of two that fits.
+    let halvings = params.branching_factor.ilog2();
+    parts.next_power_of_two().ilog2().div_ceil(halvings)
 }
 
 /// Why `n` references do not fit below a level, and how many levels would surely be needed.
@@ -480,78 +616,5 @@ pub(crate) fn depth_error(params: &BuildParams, n: usize, level: u32) -> BuildEr
     BuildError::DepthLimit {
         max_depth: params.max_depth,
         needed,
-    }
-}
-
-/// The children of the node that is being made: at most [`MAX_CHILDREN`], without allocation.
-struct Children<'a> {
-    ranges: [Option<Range<'a>>; MAX_CHILDREN],
-    len: usize,
-}
-
-impl<'a> Children<'a> {
-    fn new([left, right]: [Range<'a>; 2]) -> Self {
-        let mut children = Self {
-            ranges: [const { None }; MAX_CHILDREN],
-            len: 0,
-        };
-        children.push(left);
-        children.push(right);
-        children
-    }
-
-    fn len(&self) -> usize {
-        self.len
-    }
-
-    fn push(&mut self, range: Range<'a>) {
-        self.ranges[self.len] = Some(range);
-        self.len += 1;
-    }
-
-    /// The child with the largest value among those that qualify; ties keep the first.
-    fn best(
-        &self,
-        qualifies: impl Fn(&Range<'a>) -> bool,
-        value: impl Fn(&Range<'a>) -> f32,
-    ) -> Option<usize> {
-        let mut best: Option<(usize, f32)> = None;
-        for (index, range) in self.ranges.iter().enumerate() {
-            if let Some(range) = range.as_ref().filter(|range| qualifies(range)) {
-                let value = value(range);
-                if best.is_none_or(|(_, other)| value > other) {
-                    best = Some((index, value));
-                }
-            }
-        }
-        best.map(|(index, _)| index)
-    }
-
-    /// Takes a child out; its place must be filled again.
-    fn take(&mut self, index: usize) -> Range<'a> {
-        self.ranges[index]
-            .take()
-            .expect("`best` names a child that is there")
-    }
-
-    fn put(&mut self, index: usize, range: Range<'a>) {
-        self.ranges[index] = Some(range);
-    }
-
-    /// Moves the last child into the empty place `index` (which may be the last itself).
-    fn put_last_at(&mut self, index: usize) {
-        self.len -= 1;
-        if index != self.len {
-            self.ranges[index] = self.ranges[self.len].take();
-        }
-    }
-
-    fn sort_by_descending_size(&mut self) {
-        self.ranges[..self.len]
-            .sort_by_key(|range| std::cmp::Reverse(range.as_ref().map_or(0, Range::len)));
-    }
-
-    fn into_iter(self) -> impl Iterator<Item = Range<'a>> {
-        self.ranges.into_iter().flatten()
     }
 }

@@ -17,9 +17,11 @@
 
 use super::{
     binary::{Below, BinaryTree, Node, ROOT},
+    control::BuildControl,
     primitive::Bounds,
     tasks,
 };
+use crate::error::BuildError;
 
 /// The most rounds, and the share of the areas that a round must gain for another one. On Sponza
 /// three rounds gain 10 %, 3 % and 0.7 %.
@@ -68,15 +70,20 @@ impl Memory {
 }
 
 /// Optimises a tree, which is and will be in preorder.
-pub(crate) fn optimize(tree: &mut BinaryTree, memory: &mut Memory) {
+pub(crate) fn optimize(
+    tree: &mut BinaryTree,
+    memory: &mut Memory,
+    control: &BuildControl,
+) -> Result<(), BuildError> {
     for _ in 0..ROUNDS {
         let total = sum_of_areas(tree);
-        let gain = round(tree, memory);
+        let gain = round(tree, memory, control)?;
         tree.sort();
         if gain < LEAST_GAIN * total {
             break;
         }
     }
+    Ok(())
 }
 
 /// The areas of the inner nodes.
@@ -89,7 +96,11 @@ fn sum_of_areas(tree: &BinaryTree) -> f64 {
 }
 
 /// Tries to move every node once; returns by how much the sum of areas shrank.
-fn round(tree: &mut BinaryTree, memory: &mut Memory) -> f64 {
+fn round(
+    tree: &mut BinaryTree,
+    memory: &mut Memory,
+    control: &BuildControl,
+) -> Result<f64, BuildError> {
     let Memory { keys, moves } = memory;
     keys.clear();
     keys.extend((0..).zip(&tree.nodes).map(|(index, node): (u32, _)| {
@@ -104,6 +115,7 @@ fn round(tree: &mut BinaryTree, memory: &mut Memory) -> f64 {
     candidates.sort_unstable();
     let mut gain = 0.0;
     for batch in candidates.chunks(BATCH) {
+        control.check()?;
         moves.clear();
         moves.extend(batch.iter().map(|&key| Move {
             from: key as u32,
@@ -121,7 +133,7 @@ fn round(tree: &mut BinaryTree, memory: &mut Memory) -> f64 {
             gain += reinsert(&mut tree.nodes, candidate);
         }
     }
-    gain
+    Ok(gain)
 }
 
 fn united(a: &Bounds, b: &Bounds) -> Bounds {
@@ -328,7 +340,7 @@ mod tests {
             };
             let mut tree = tree(1 + seed as usize * 3, seed, shape);
             let (before, area) = (leaves(&tree), sum_of_areas(&tree));
-            optimize(&mut tree, &mut Memory::default());
+            optimize(&mut tree, &mut Memory::default(), &BuildControl::default()).unwrap();
             assert_eq!(leaves(&tree), before);
             let after = sum_of_areas(&tree);
             assert!(after <= area * (1.0 + 1e-12), "{after} {area}");

@@ -34,6 +34,11 @@ pub(crate) fn in_pieces(n: usize) -> bool {
     n >= PIECES_FROM && threads() > 1
 }
 
+/// Whether what is below a node of `n` references is worth being given to several threads.
+pub(crate) fn is_task(n: usize) -> bool {
+    n >= TASK_SIZE && threads() > 1
+}
+
 #[cfg(feature = "parallel")]
 fn threads() -> usize {
     rayon::current_num_threads()
