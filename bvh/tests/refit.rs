@@ -156,6 +156,8 @@ fn slots_and_orders_follow_what_moves() {
     for params in all_params() {
         // Built while all was turned by a point reflection: every order and no area is another.
         let mut tree = Bvh::build(&[&turned], &params).unwrap();
+        // Cuts are lost, and agglomeration sees a mirrored mesh with other eyes.
+        let differs = tree.stats().duplication > 1.0 || params.quality == Quality::Agglomerative;
         tree.refit(&[&mesh]).unwrap();
         let (mut refitted, mut fresh) = (Work::default(), Work::default());
         let built = Bvh::build(&[&mesh], &params).unwrap();
@@ -167,9 +169,9 @@ fn slots_and_orders_follow_what_moves() {
             );
         }
         let ratio = refitted.nodes as f64 / fresh.nodes as f64;
-        // Orders that do not follow cost twice the nodes; cuts that are lost and builders that see
-        // a mirrored mesh with other eyes cost a tenth.
-        assert!(ratio < 1.15, "{ratio} {params:?}");
+        // Orders that do not follow would cost twice the nodes.
+        let limit = if differs { 1.15 } else { 1.05 };
+        assert!(ratio < limit, "{ratio} {params:?}");
     }
 }
 

@@ -14,6 +14,7 @@ mod binary;
 pub(crate) mod binning;
 mod collapse;
 pub(crate) mod control;
+mod curve;
 mod introsort;
 mod morton;
 pub(crate) mod partition;

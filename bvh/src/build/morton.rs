@@ -14,6 +14,7 @@ use super::{
     BuildWorkspace, LeafReference,
     binning::Rounding,
     control::{CHECK_SIZE, Running},
+    curve::{self, spread_bits},
     introsort,
     primitive::{Bounds, PrimitiveRef},
     radix,
@@ -105,20 +106,7 @@ impl<R: Rounding> Builder<'_, R> {
 
     /// Gives keys the codes of the grid over their own centroids.
     fn encode(&self, keys: &mut [u64]) {
-        let centroids = tasks::map_merge(
-            keys,
-            &|keys: &[u64]| {
-                let mut bounds = Bounds::EMPTY;
-                for &key in keys {
-                    bounds.extend_by_point(self.reference(key).doubled_centroid());
-                }
-                bounds
-            },
-            &|mut a: Bounds, b| {
-                a.extend(&b);
-                a
-            },
-        );
+        let centroids = curve::centroid_bounds(keys, |&key| self.reference(key).doubled_centroid());
         let (lower, extent) = (centroids.lower(), centroids.extent().to_array());
         let scale = f32x4::new(extent.map(|e| {
             if e > SMALLEST_EXTENT {
@@ -132,7 +120,7 @@ impl<R: Rounding> Builder<'_, R> {
                 let centroid = self.reference(*key).doubled_centroid();
                 let cell = ((centroid - lower) * scale).fast_round_int();
                 let [x, y, z, _] = cell.to_array().map(|c| spread_bits(c as u32));
-                *key = u64::from(x | y << 1 | z << 2) << CODE_SHIFT | u64::from(*key as u32);
+                *key = (x | y << 1 | z << 2) << CODE_SHIFT | u64::from(*key as u32);
             }
         });
     }
@@ -326,25 +314,4 @@ struct Children {
 /// The middle of the absolute places of a range, within it.
 fn middle(begin: usize, n: usize) -> usize {
     (2 * begin + n) / 2 - begin
-}
-
-/// Moves bit i of ten to bit 3i.
-fn spread_bits(x: u32) -> u32 {
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bits_are_spread_by_three() {
-        for x in 0..1024_u32 {
-            let expected = (0..10).map(|bit| (x >> bit & 1) << (3 * bit)).sum::<u32>();
-            assert_eq!(spread_bits(x), expected);
-        }
-    }
 }
