@@ -13,7 +13,7 @@
 //! is always inlined, a closure may be compiled by itself, without the instruction set of the
 //! kernel, and then each operation becomes a call (seen: 7 times slower).
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use super::triangle::{BlockHits, NODE_PAD, TriangleTest};
 use crate::{
@@ -59,45 +59,48 @@ impl RaySetup {
     /// interval, or an origin so far away that it has no precision left.
     #[inline]
     pub(crate) fn new(ray: &Ray, scale: f32) -> Option<Self> {
-        let origin = ray.origin * scale;
-        let largest = ray.direction.abs().max_element();
+        let origin = Vec3A::from(ray.origin) * scale;
+        let given = Vec3A::from(ray.direction);
+        let largest = given.abs().max_element();
         let t_min = ray.t_min.max(0.0);
         // Comparisons are written so that NaN fails them; max_element may drop a NaN, so the
         // components are asked too.
         let usable = largest > 0.0
-            && ray.direction.is_finite()
-            && origin.abs().cmple(Vec3::splat(FARTHEST_ORIGIN)).all()
+            && given.is_finite()
+            && origin.abs().cmple(Vec3A::splat(FARTHEST_ORIGIN)).all()
             && t_min <= ray.t_max
             && !ray.t_min.is_nan();
         if !usable {
             return None;
         }
         let [direction_scale, lift] = direction_scale(largest);
-        let direction = ray.direction * lift * direction_scale;
-        let reciprocal = direction.to_array().map(|d| {
-            if d.abs() < SMALLEST_COMPONENT {
-                SMALLEST_COMPONENT.copysign(d)
-            } else {
-                d
-            }
-            .recip()
-        });
-        let margin = std::array::from_fn(|axis| {
-            (COORDINATE_BOUND + origin[axis].abs()) * reciprocal[axis].abs()
-        });
+        let direction = given * lift * direction_scale;
+        let smallest = Vec3A::splat(SMALLEST_COMPONENT);
+        let reciprocal = Vec3A::select(
+            direction.abs().cmplt(smallest),
+            smallest.copysign(direction),
+            direction,
+        )
+        .recip();
+        let margin = (Vec3A::splat(COORDINATE_BOUND) + origin.abs()) * reciprocal.abs();
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
         let unscale = [direction_scale, lift / scale];
-        let scaled = |t: f32| t / unscale[1] / unscale[0];
+        let scaled = |t: f32| {
+            if unscale == [1.0, scale.recip()] {
+                // What the divisions give, as powers of two have exact reciprocals, but sooner.
+                t * scale
+            } else {
+                t / unscale[1] / unscale[0]
+            }
+        };
         Some(Self {
             origin: origin.to_array(),
             direction: direction.to_array(),
-            reciprocal,
-            margin,
+            reciprocal: reciprocal.to_array(),
+            margin: margin.to_array(),
             t_min: scaled(t_min),
             t_max: scaled(ray.t_max),
-            octant: (0..3)
-                .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
-                .sum(),
+            octant: reciprocal.is_negative_bitmask() as usize,
             unscale,
         })
     }
@@ -180,19 +183,13 @@ impl<L> BoxLanes<L> {
     where
         L: Lanes<N>,
     {
-        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
-        for axis in 0..3 {
-            let offset = -ray.origin[axis] * ray.reciprocal[axis];
-            let pad = margin[axis] * NODE_PAD;
-            near_addend[axis] = offset - pad;
-            far_addend[axis] = offset + pad;
-            near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
-        }
+        let offset = -Vec3A::from(ray.origin) * Vec3A::from(ray.reciprocal);
+        let pad = Vec3A::from(margin) * NODE_PAD;
         Self {
             reciprocal: splat_all(ray.reciprocal),
-            near_addend: splat_all(near_addend),
-            far_addend: splat_all(far_addend),
-            near_plane,
+            near_addend: splat_all((offset - pad).to_array()),
+            far_addend: splat_all((offset + pad).to_array()),
+            near_plane: [0, 1, 2].map(|axis| 2 * axis + (ray.octant >> axis & 1)),
             t_min: L::splat(ray.t_min),
         }
     }
@@ -215,9 +212,9 @@ impl<L> BoxLanes<L> {
             .mul_add(self.reciprocal[axis], self.far_addend[axis])
     }
 
-    /// Distances at which the boxes of a node are entered, and one bit per box that is.
+    /// Distances at which the boxes of a node are entered and left.
     #[inline(always)]
-    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
+    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, L)
     where
         L: Lanes<N>,
     {
@@ -225,12 +222,12 @@ impl<L> BoxLanes<L> {
         let enter = enter.max(self.near(node, 2).max(self.t_min));
         let leave = self.far(node, 0).min(self.far(node, 1));
         let leave = leave.min(self.far(node, 2).min(L::splat(t_max)));
-        (enter, L::bits(enter.le(leave)))
+        (enter, leave)
     }
 }
 
 /// Follows a reference down to a leaf, the first child in order before the others, which wait on
-/// the stack. `None` if the ray enters no further box.
+/// the stack: by the order for an octant, or as they lie. `None` if the ray enters no further box.
 ///
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
@@ -240,16 +237,22 @@ fn descend<const N: usize, const W: usize, B, L: Lanes<N>, C: Count>(
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
     t_max: f32,
-    order: impl Fn(&Node<N, W>) -> u64,
+    octant: Option<usize>,
     stack: &mut Stack<N>,
     count: &mut C,
 ) -> Option<ChildRef> {
     while !reference.is_leaf() {
         count.node();
         let node = &tree.nodes[reference.0 as usize];
-        let (enter, mask) = boxes.test(node, t_max);
+        let (enter, leave) = boxes.test(node, t_max);
+        let mask = L::bits(enter.le(leave));
         reference = if mask & mask.wrapping_sub(1) != 0 {
-            enter.push_children(mask, &node.children, order(node), stack);
+            match octant {
+                Some(octant) => {
+                    enter.push_children(leave, &node.children, node.order(octant), stack);
+                }
+                None => enter.push_in_slot_order(leave, &node.children, stack),
+            }
             ChildRef(stack.pop()?.0)
         } else if mask != 0 {
             ChildRef(node.children[mask.trailing_zeros() as usize & (N - 1)])
@@ -294,13 +297,12 @@ pub(crate) fn closest<
         if distance > best.t {
             continue;
         }
-        let order = |node: &Node<N, W>| node.order(ray.octant);
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             best.t,
-            order,
+            Some(ray.octant),
             &mut stack,
             count,
         ) else {
@@ -389,13 +391,12 @@ pub(crate) fn any<
         ray.t_min,
     );
     while let Some((reference, _)) = stack.pop() {
-        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             ray.t_max,
-            order,
+            None,
             &mut stack,
             count,
         ) else {
@@ -434,13 +435,12 @@ pub(crate) fn all<
         ray.t_min,
     );
     while let Some((reference, _)) = stack.pop() {
-        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             ray.t_max,
-            order,
+            None,
             &mut stack,
             &mut (),
         ) else {
