@@ -1,7 +1,13 @@
-//! The volume raycaster: an empty room with its door open.
+//! The volume raycaster: grids, transfer functions, empty space, ray casting.
 //!
-//! Here will live grids and their loaders, transfer functions, voxel blocks with empty-space
-//! skipping, ray casting with early ray termination, and the model that predicts the time of the
-//! next frame. It will stand on `raywright-bvh` (the boundary of the non-empty blocks is a
-//! primitive set like any other) and on `raywright-imaging`, and know nothing of the path tracer.
-#![forbid(unsafe_code)]
+//! It stands on `raywright-bvh` (the non-empty blocks of voxels and their boundary are primitives
+//! like any other) and on `raywright-imaging`, and knows nothing of the path tracer.
+#![deny(unsafe_code)]
+
+pub mod grid;
+pub mod transfer;
+
+pub use crate::{
+    grid::{GridError, Orientation, ValueScale, Volume, Voxels},
+    transfer::{ControlPoint, TransferError, TransferFunction},
+};
