@@ -23,6 +23,7 @@ mod radix;
 pub(crate) mod record;
 pub(crate) mod recursion;
 mod reinsertion;
+mod rotations;
 mod spatial;
 pub(crate) mod tasks;
 
