@@ -148,8 +148,11 @@ impl Bvh {
     /// Gives up the tree for its memory, in which the workspace builds another; of whatever
     /// parameters, though nodes are only used again for the same width (2, 3 to 4, 5 to 8, 9 to 16)
     /// and blocks for the same leaf format and accuracy. What eight builds in a row had no use for
-    /// is freed. A tree that was built for [`Dynamics::Static`](crate::Dynamics) is only dropped,
-    /// and so is one that does not fit in the workspace's limit of memory.
+    /// is freed. A tree in the memory of a larger one holds all of it, which
+    /// [`TreeStats::bytes`](crate::TreeStats::bytes) does not count.
+    ///
+    /// A tree that was built for [`Dynamics::Static`](crate::Dynamics) is only dropped, and so is
+    /// one that does not fit in the workspace's limit of memory.
     pub fn recycle(self, workspace: &mut BuildWorkspace) {
         let Self {
             tree,
