@@ -42,9 +42,10 @@ pub enum Rounding {
 /// What a [`BuildWorkspace`](crate::BuildWorkspace) keeps for the next build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dynamics {
-    /// The temporary memory is kept: the tree will be built again soon.
+    /// The temporary memory is kept, and that of a recycled tree: it will be built again soon.
     Dynamic,
-    /// The temporary memory is freed after the build (the paper's flag `static`).
+    /// The temporary memory is freed after the build (the paper's flag `static`), and so is the
+    /// tree when it is given up.
     Static,
 }
 
