@@ -38,6 +38,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 for ray in &rays {
                     let _ = tree.closest_hit_with_work(ray, &mut work);
                 }
+                // The next build takes the memory of this tree.
+                tree.recycle(&mut workspace);
                 // A node of N boxes and a block of four triangles cost about the same.
                 Outcome::Done {
                     cost: (work.nodes + work.blocks) as f64 / rays.len() as f64,

@@ -5,6 +5,8 @@ use crate::{
     error::BuildError,
     layout::{
         emit::Source,
+        node::Node,
+        spares::{Part, Spares},
         tree::Tree,
         triangles::{CornerBlock, EdgeBlock, IndexBlock, Triangles},
     },
@@ -53,17 +55,23 @@ macro_rules! for_width {
 pub(crate) use for_width;
 
 impl AnyTree {
-    /// The tree of a build.
+    /// The tree of a build, in spare memory where there is some.
     pub(crate) fn new(
         source: &Source<'_, Triangles<'_>>,
         params: &BuildParams,
+        spares: &mut Spares,
     ) -> Result<Self, BuildError> {
         Ok(match params.branching_factor {
-            ..=2 => Self::Two(Formatted::new(source, params)?),
-            3..=4 => Self::Four(Formatted::new(source, params)?),
-            5..=8 => Self::Eight(Formatted::new(source, params)?),
-            _ => Self::Sixteen(Formatted::new(source, params)?),
+            ..=2 => Self::Two(Formatted::new(source, params, spares)?),
+            3..=4 => Self::Four(Formatted::new(source, params, spares)?),
+            5..=8 => Self::Eight(Formatted::new(source, params, spares)?),
+            _ => Self::Sixteen(Formatted::new(source, params, spares)?),
         })
+    }
+
+    /// Gives up the tree for its memory.
+    pub(crate) fn recycle(self, spares: &mut Spares) {
+        for_width!(self, tree => tree.recycle(spares));
     }
 
     pub(crate) fn stats(&self, params: &BuildParams) -> TreeStats {
@@ -98,14 +106,27 @@ impl AnyTree {
 impl<const N: usize, const W: usize> Formatted<N, W>
 where
     Widths: Width<N>,
+    Node<N, W>: Part,
 {
-    fn new(source: &Source<'_, Triangles<'_>>, params: &BuildParams) -> Result<Self, BuildError> {
+    fn new(
+        source: &Source<'_, Triangles<'_>>,
+        params: &BuildParams,
+        spares: &mut Spares,
+    ) -> Result<Self, BuildError> {
         Ok(match (params.leaf_format, params.accuracy) {
-            (LeafFormat::Edges, Accuracy::Fast) => Self::Fast(source.emit()?),
-            (LeafFormat::Edges, Accuracy::Robust) => Self::Robust(source.emit()?),
-            (LeafFormat::Compact, Accuracy::Fast) => Self::CompactFast(source.emit()?),
-            (LeafFormat::Compact, Accuracy::Robust) => Self::CompactRobust(source.emit()?),
+            (LeafFormat::Edges, Accuracy::Fast) => Self::Fast(source.emit(spares)?),
+            (LeafFormat::Edges, Accuracy::Robust) => Self::Robust(source.emit(spares)?),
+            (LeafFormat::Compact, Accuracy::Fast) => Self::CompactFast(source.emit(spares)?),
+            (LeafFormat::Compact, Accuracy::Robust) => Self::CompactRobust(source.emit(spares)?),
         })
+    }
+
+    fn recycle(self, spares: &mut Spares) {
+        match self {
+            Self::Fast(tree) => tree.recycle(spares),
+            Self::Robust(tree) => tree.recycle(spares),
+            Self::CompactFast(tree) | Self::CompactRobust(tree) => tree.recycle(spares),
+        }
     }
 
     fn stats(&self, params: &BuildParams) -> TreeStats {

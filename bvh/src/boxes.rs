@@ -16,6 +16,7 @@ use crate::{
     layout::{
         box_block::{BoxBlock, Boxes, scaled},
         emit::Source,
+        spares::Spares,
         tree::Tree,
     },
     mesh::TriangleMesh,
@@ -65,12 +66,16 @@ enum BoxTree {
 }
 
 impl BoxTree {
-    fn new(source: &Source<'_, Boxes<'_>>, params: &BuildParams) -> Result<Self, BuildError> {
+    fn new(
+        source: &Source<'_, Boxes<'_>>,
+        params: &BuildParams,
+        spares: &mut Spares,
+    ) -> Result<Self, BuildError> {
         Ok(match params.branching_factor {
-            ..=2 => Self::Two(source.emit()?),
-            3..=4 => Self::Four(source.emit()?),
-            5..=8 => Self::Eight(source.emit()?),
-            _ => Self::Sixteen(source.emit()?),
+            ..=2 => Self::Two(source.emit(spares)?),
+            3..=4 => Self::Four(source.emit(spares)?),
+            5..=8 => Self::Eight(source.emit(spares)?),
+            _ => Self::Sixteen(source.emit(spares)?),
         })
     }
 
@@ -84,6 +89,10 @@ impl BoxTree {
 
     fn all(&self, isa: Isa, ray: &RaySetup, visit: impl FnMut(Candidate)) {
         for_width!(self, tree => dispatch::all::<_, _, _, BoxTest>(isa, tree, ray, visit));
+    }
+
+    fn recycle(self, spares: &mut Spares) {
+        for_width!(self, tree => tree.recycle(spares));
     }
 
     fn stats(&self, params: &BuildParams) -> TreeStats {
@@ -121,7 +130,7 @@ impl BoxBvh {
             leaves: &workspace.leaves,
             primitives: Boxes { boxes, scale },
         };
-        let tree = BoxTree::new(&source, params)?;
+        let tree = BoxTree::new(&source, params, &mut workspace.spares)?;
         workspace.end(params);
         Ok(Self {
             tree,
@@ -130,6 +139,12 @@ impl BoxBvh {
             params: *params,
             isa: Isa::best(),
         })
+    }
+
+    /// Gives up the tree for its memory, as [`Bvh::recycle`](crate::Bvh::recycle).
+    pub fn recycle(self, workspace: &mut BuildWorkspace) {
+        let Self { tree, params, .. } = self;
+        workspace.keep_parts(&params, |spares| tree.recycle(spares));
     }
 
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine

@@ -88,7 +88,13 @@ impl Bvh {
     }
 
     /// Builds a tree in the memory of an earlier build. With
-    /// [`Dynamics::Dynamic`](crate::Dynamics) the memory stays in the workspace for the next.
+    /// [`Dynamics::Dynamic`](crate::Dynamics) the memory stays in the workspace for the next. The
+    /// tree itself takes the memory of an older one that was given to [`Bvh::recycle`], if there is
+    /// one.
+    ///
+    /// Whoever builds the same scene frame by frame, and recycles each tree, allocates nothing more
+    /// from the third build on, as long as one thread builds; several need some kilobytes, which
+    /// they free at the end.
     ///
     /// # Errors
     /// As [`Bvh::build`].
@@ -98,8 +104,10 @@ impl Bvh {
         workspace: &mut BuildWorkspace,
     ) -> Result<Self, BuildError> {
         params.validate().map_err(BuildError::Parameters)?;
-        let first_ids = first_ids(meshes)?;
-        workspace.begin(first_ids[meshes.len()] as usize, params)?;
+        workspace.begin(triangle_count(meshes)?, params)?;
+        let mut first_ids = workspace.spares.take_empty(meshes.len() + 1);
+        number_triangles(meshes, &mut first_ids);
+        number_points(meshes, &mut workspace.first_points)?;
         let bounds = reference_all(meshes, &mut workspace.references);
         let scale = scale_of(&bounds)?;
         tasks::for_each_piece(&mut workspace.references, &|piece| {
@@ -120,11 +128,11 @@ impl Bvh {
             primitives: Triangles {
                 meshes,
                 first_ids: &first_ids,
-                first_points: &first_points(meshes)?,
+                first_points: &workspace.first_points,
                 scale,
             },
         };
-        let tree = AnyTree::new(&source, params)?;
+        let tree = AnyTree::new(&source, params, &mut workspace.spares)?;
         workspace.end(params);
         Ok(Self {
             tree,
@@ -135,6 +143,27 @@ impl Bvh {
             isa: Isa::best(),
             last_refit: None,
         })
+    }
+
+    /// Gives up the tree for its memory, in which the workspace builds another; of whatever
+    /// parameters, though nodes are only used again for the same width (2, 3 to 4, 5 to 8, 9 to 16)
+    /// and blocks for the same leaf format and accuracy. What eight builds in a row had no use for
+    /// is freed. A tree in the memory of a larger one holds all of it, which
+    /// [`TreeStats::bytes`](crate::TreeStats::bytes) does not count.
+    ///
+    /// A tree that was built for [`Dynamics::Static`](crate::Dynamics) is only dropped, and so is
+    /// one that does not fit in the workspace's limit of memory.
+    pub fn recycle(self, workspace: &mut BuildWorkspace) {
+        let Self {
+            tree,
+            first_ids,
+            params,
+            ..
+        } = self;
+        workspace.keep_parts(&params, |spares| {
+            tree.recycle(spares);
+            spares.keep(first_ids);
+        });
     }
 
     /// Moves the tree to new vertices: the same meshes in the same order with as many triangles
@@ -158,7 +187,8 @@ impl Bvh {
         self.check_counts(meshes)?;
         let bounds = bounds_of(meshes);
         let scale = scale_of(&bounds)?;
-        let first_points = first_points(meshes)?;
+        let mut first_points = Vec::new();
+        number_points(meshes, &mut first_points)?;
         let (sah_cost_built, sah_cost_before) = match self.last_refit {
             Some(last) => (last.sah_cost_built, last.sah_cost_after),
             None => {
@@ -294,8 +324,8 @@ pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32])
     }
 }
 
-/// The number of each mesh's first triangle over all meshes, and the total at the end.
-pub(crate) fn first_ids(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, MeshError> {
+/// How many triangles all meshes have.
+pub(crate) fn triangle_count(meshes: &[&TriangleMesh]) -> Result<usize, MeshError> {
     let count: usize = meshes.iter().map(|mesh| mesh.triangles().len()).sum();
     if count > TriangleMesh::MAX_TRIANGLES {
         return Err(MeshError::TooManyTriangles {
@@ -303,18 +333,18 @@ pub(crate) fn first_ids(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, MeshError>
             limit: TriangleMesh::MAX_TRIANGLES,
         });
     }
-    let mut next = 0;
-    let mut first_ids = Vec::with_capacity(meshes.len() + 1);
-    for mesh in meshes {
-        first_ids.push(next);
-        next += mesh.triangles().len() as u32;
-    }
-    first_ids.push(next);
-    Ok(first_ids)
+    Ok(count)
 }
 
-/// Number of each mesh's first vertex over all meshes, and the total at the end.
-fn first_points(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, BuildError> {
+/// Fills in the number of each mesh's first triangle over all meshes, and the total at the end, of
+/// no more triangles than [`triangle_count`] allows.
+pub(crate) fn number_triangles(meshes: &[&TriangleMesh], first_ids: &mut Vec<u32>) {
+    let counts = meshes.iter().map(|mesh| mesh.triangles().len());
+    number(counts, first_ids);
+}
+
+/// Fills in the number of each mesh's first vertex over all meshes, and the total at the end.
+fn number_points(meshes: &[&TriangleMesh], first_points: &mut Vec<u32>) -> Result<(), BuildError> {
     const LIMIT: usize = u32::MAX as usize;
     let count = meshes.iter().map(|mesh| mesh.vertices().len()).sum();
     if count > LIMIT {
@@ -324,14 +354,21 @@ fn first_points(meshes: &[&TriangleMesh]) -> Result<Vec<u32>, BuildError> {
             limit: LIMIT,
         });
     }
+    let counts = meshes.iter().map(|mesh| mesh.vertices().len());
+    number(counts, first_points);
+    Ok(())
+}
+
+/// The sum of the counts before each, and that of all, which `u32` holds.
+fn number(counts: impl ExactSizeIterator<Item = usize>, firsts: &mut Vec<u32>) {
     let mut next = 0;
-    let mut first_points = Vec::with_capacity(meshes.len() + 1);
-    for mesh in meshes {
-        first_points.push(next);
-        next += mesh.vertices().len() as u32;
+    firsts.clear();
+    firsts.reserve_exact(counts.len() + 1);
+    for count in counts {
+        firsts.push(next);
+        next += count as u32;
     }
-    first_points.push(next);
-    Ok(first_points)
+    firsts.push(next);
 }
 
 /// Fills in the box of each triangle in the caller's coordinates; gives the box around them.

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{bits, built_qualities, contents, pool, primitives, random_rays, sphere};
+use common::{and_rotated, bits, built_qualities, contents, pool, primitives, random_rays, sphere};
 use raywright_bvh::{
     Accuracy, BuildError, BuildParams, BuildWorkspace, Bvh, Corners, Hierarchy, LeafReference,
     MeshError, ParameterFault, Quality, Ray, TriangleMesh, Vec3, reference,
@@ -11,13 +11,13 @@ use raywright_bvh::{
 
 const WIDTHS: [u32; 4] = [2, 4, 8, 16];
 
-/// Every built quality × width.
+/// Every built quality × width; Morton order with and without rotations.
 fn all_params() -> Vec<BuildParams> {
     let qualities = built_qualities();
     let pairs = qualities
         .iter()
         .flat_map(|&q| WIDTHS.map(|width| (q, width)));
-    pairs
+    let all = pairs
         .map(|(quality, width)| {
             let mut params = BuildParams::default();
             params.quality = quality;
@@ -26,7 +26,8 @@ fn all_params() -> Vec<BuildParams> {
             params.split_budget = 1.5;
             params
         })
-        .collect()
+        .collect();
+    and_rotated(all)
 }
 
 /// Leaves of one primitive: the deepest tree.

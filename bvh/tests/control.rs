@@ -96,6 +96,57 @@ fn control_outlives_the_memory_of_a_static_build() {
 }
 
 #[test]
+fn a_limit_holds_whatever_was_built_and_recycled_before() {
+    let meshes = [terrain(100), terrain(37)];
+    let most = |n: usize| {
+        let needed = every_quality().into_iter();
+        let needed = needed.map(|params| BuildWorkspace::bytes_needed(n, &params));
+        needed.max().unwrap()
+    };
+    let limit = most(meshes[0].triangles().len());
+    let mut workspace = BuildWorkspace::default();
+    workspace.control.memory_limit = Some(limit);
+    let mut kept = vec![];
+    for round in 0..4 {
+        for params in every_quality() {
+            let mesh = &meshes[round % 2];
+            let tree = Bvh::build_in(&[mesh], &params, &mut workspace).unwrap();
+            assert!(workspace.bytes() <= limit, "{:?}", params.quality);
+            tree.recycle(&mut workspace);
+            assert!(workspace.bytes() <= limit, "{:?}", params.quality);
+            kept.push(workspace.bytes());
+        }
+    }
+    // A limit does not mean that all is freed each time.
+    assert!(kept.iter().any(|&bytes| bytes > limit / 4));
+    // A smaller one is kept from the next build on.
+    let params = BuildParams::default();
+    let limit = BuildWorkspace::bytes_needed(meshes[1].triangles().len(), &params);
+    workspace.control.memory_limit = Some(limit);
+    Bvh::build_in(&[&meshes[1]], &params, &mut workspace).unwrap();
+    assert!(workspace.bytes() <= limit);
+}
+
+#[test]
+fn a_tree_that_passes_the_limit_is_not_kept() {
+    let mesh = terrain(100);
+    let params = BuildParams::default();
+    let needed = BuildWorkspace::bytes_needed(mesh.triangles().len(), &params);
+    let mut workspace = BuildWorkspace::default();
+    let mut kept = |limit: Option<usize>| {
+        workspace.control.memory_limit = limit;
+        let tree = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
+        let (bytes, before) = (tree.stats().bytes, workspace.bytes());
+        tree.recycle(&mut workspace);
+        (workspace.bytes() - before, bytes)
+    };
+    let (added, bytes) = kept(None);
+    assert!(added >= bytes && added < bytes + 100);
+    assert_eq!(kept(Some(needed)).0, 0);
+    assert!(kept(Some(needed + 2 * bytes)).0 >= bytes);
+}
+
+#[test]
 fn memory_is_what_was_announced_and_a_limit_is_kept() {
     let mesh = terrain(100);
     let n = mesh.triangles().len();

@@ -63,12 +63,24 @@ fn nodes_leaves_depth_and_cost_are_embrees() {
     let morton = BuildParams::embree_mesh_morton();
     let mut compact = BuildParams::embree_scene_medium();
     compact.branching_factor = 4;
+    let rotated = BuildParams::embree_mesh_morton_compact();
     // Scene, settings, inner nodes, leaves, SAH of nodes, SAH of blocks, fill, depth.
     let expected = [
         ("sponza", medium, 15_053, 63_191, 13.810, 9.092, 0.650, 13),
         ("sponza", compact, 23_278, 58_017, 21.603, 9.674, 0.873, 18),
         ("sponza", high, 16_658, 70_523, 11.683, 9.052, 0.654, 12),
         ("sponza", morton, 27_953, 89_874, 22.818, 9.241, 0.527, 9),
+        ("sponza", rotated, 42_520, 89_874, 27.972, 9.241, 0.778, 17),
+        (
+            "sponza_dabrovic",
+            rotated,
+            10_883,
+            24_145,
+            28.883,
+            8.300,
+            0.8046,
+            15,
+        ),
         (
             "sponza_dabrovic",
             medium,

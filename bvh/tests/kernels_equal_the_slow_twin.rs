@@ -103,6 +103,7 @@ fn params() -> impl Strategy<Value = BuildParams> {
         1u32..=64,
         0f32..10.0,
         0f32..10.0,
+        0u32..4,
         prop::sample::select(vec![
             Quality::Morton,
             Quality::Agglomerative,
@@ -112,7 +113,7 @@ fn params() -> impl Strategy<Value = BuildParams> {
         ]),
     )
         .prop_map(
-            |(depth, block, min_leaf, max_leaf, traversal, intersection, quality)| {
+            |(depth, block, min_leaf, max_leaf, traversal, intersection, rotations, quality)| {
                 let mut params = BuildParams::default();
                 params.quality = quality;
                 params.split_budget = 2.0;
@@ -122,6 +123,7 @@ fn params() -> impl Strategy<Value = BuildParams> {
                 params.max_leaf_size = max_leaf;
                 params.traversal_cost = traversal;
                 params.intersection_cost = intersection;
+                params.rotations = rotations;
                 params
             },
         )

@@ -97,6 +97,7 @@ impl<C: Clock> Session<'_, C> {
                 let rendered = self
                     .stage
                     .render(&tree, round as u32, Duration::MAX, cancel)?;
+                self.stage.recycle(tree);
                 let Rendered::Finished { time: render, .. } = rendered else {
                     return Ok(Comparison { rows });
                 };

@@ -183,6 +183,11 @@ impl<C: Clock> Stage<'_, C> {
         ))
     }
 
+    /// Leaves the memory of a tree to the next.
+    pub(super) fn recycle(&mut self, tree: Bvh) {
+        tree.recycle(&mut self.workspace);
+    }
+
     /// Renders one sample of every pixel into a film of its own.
     pub(super) fn render(
         &self,
@@ -294,7 +299,9 @@ impl<'a, C: Clock> Session<'a, C> {
                     .stage
                     .build(&BuildParams::default())
                     .map_err(SessionError::Build)?;
-                match self.stage.render(&tree, 0, Duration::MAX, cancel)? {
+                let rendered = self.stage.render(&tree, 0, Duration::MAX, cancel)?;
+                self.stage.recycle(tree);
+                match rendered {
                     Rendered::Finished { time, .. } => *self.limit.insert(time * SLOWEST_TRIAL),
                     Rendered::TooSlow | Rendered::Cancelled => return Ok(None),
                 }
@@ -304,22 +311,26 @@ impl<'a, C: Clock> Session<'a, C> {
         let params = self.space.params(&trial.config);
         let trial_result = match self.stage.build(&params) {
             Err(error) => Err(TrialFailure::Build(error)),
-            Ok((tree, build)) => match self.stage.render(&tree, self.finished, limit, cancel)? {
-                Rendered::Finished { film, time } => Ok((
-                    film,
-                    FrameTimes {
-                        build,
-                        render: time,
-                    },
-                )),
-                Rendered::TooSlow => Err(TrialFailure::TooSlow),
-                Rendered::Cancelled => {
-                    self.tuner
-                        .tell(trial.id, Outcome::Cancelled)
-                        .map_err(SessionError::Tell)?;
-                    return Ok(None);
+            Ok((tree, build)) => {
+                let rendered = self.stage.render(&tree, self.finished, limit, cancel)?;
+                self.stage.recycle(tree);
+                match rendered {
+                    Rendered::Finished { film, time } => Ok((
+                        film,
+                        FrameTimes {
+                            build,
+                            render: time,
+                        },
+                    )),
+                    Rendered::TooSlow => Err(TrialFailure::TooSlow),
+                    Rendered::Cancelled => {
+                        self.tuner
+                            .tell(trial.id, Outcome::Cancelled)
+                            .map_err(SessionError::Tell)?;
+                        return Ok(None);
+                    }
                 }
-            },
+            }
         };
         let (outcome, told) = match trial_result {
             Ok((film, times)) => {

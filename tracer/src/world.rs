@@ -75,7 +75,8 @@ impl World {
         self.scene.bounds()
     }
 
-    /// Builds a tree over the scene's meshes in the memory of an earlier build.
+    /// Builds a tree over the scene's meshes in the memory of an earlier build, and of an earlier
+    /// tree that was given to [`Bvh::recycle`].
     ///
     /// # Errors
     /// As [`Bvh::build`].

@@ -209,7 +209,8 @@ fn commit<'a>(
     }
 }
 
-/// A build in new memory, and one in the memory of the last. Nothing if it is not built yet.
+/// A build in new memory; one that reuses what the last needed while it built; one that takes the
+/// memory of the last tree too, as from frame to frame. Nothing if it is not built yet.
 fn our_builds(mesh: &TriangleMesh, params: BuildParams, clock: Clock) -> Vec<Builder<'_>> {
     if let Err(faults) = params.validate() {
         println!("\n{:?}: {}", params.quality, faults[0]);
@@ -217,6 +218,7 @@ fn our_builds(mesh: &TriangleMesh, params: BuildParams, clock: Clock) -> Vec<Bui
     }
     let sah = sah(mesh, &params);
     let workspace = RefCell::new(BuildWorkspace::default());
+    let frames = RefCell::new((BuildWorkspace::default(), None::<Bvh>));
     vec![
         Builder {
             name: "raywright Bvh::build".into(),
@@ -229,6 +231,19 @@ fn our_builds(mesh: &TriangleMesh, params: BuildParams, clock: Clock) -> Vec<Bui
             run: Box::new(move || {
                 let workspace = &mut workspace.borrow_mut();
                 clock.time(|| Bvh::build_in(&[mesh], &params, workspace).expect("a tree"))
+            }),
+        },
+        Builder {
+            name: "  and in that of the last tree".into(),
+            sah,
+            run: Box::new(move || {
+                let (workspace, tree) = &mut *frames.borrow_mut();
+                clock.time(|| {
+                    if let Some(last) = tree.take() {
+                        last.recycle(workspace);
+                    }
+                    *tree = Some(Bvh::build_in(&[mesh], &params, workspace).expect("a tree"));
+                })
             }),
         },
     ]

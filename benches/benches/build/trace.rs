@@ -1,4 +1,5 @@
-//! Rays through the trees: ours by our traversal, Embree's by its own.
+//! Rays through the trees: ours by our traversal, Embree's by its own. Ours have nodes of eight as
+//! Embree's, and of sixteen; the goals are about the width that one register holds.
 
 use raywright_benches::{
     clock::Clock,
@@ -7,7 +8,7 @@ use raywright_benches::{
     scenes::BenchScene,
     turns::{geometric_mean, measure_chunks},
 };
-use raywright_bvh::{Bvh, Quality, Ray};
+use raywright_bvh::{Bvh, Isa, Quality, Ray};
 use raywright_validation::embree::{BuildQuality, Device, SceneSettings};
 
 use super::builds::params_of;
@@ -19,6 +20,7 @@ const OPTIMIZED_GOAL: f64 = 1.15;
 /// The goal of binned SAH beside Embree's medium on diffuse rays of one scene.
 const BINNED_GOAL: f64 = 0.9;
 const BINNED_SCENE: &str = "sponza";
+const WIDTHS: [u32; 2] = [8, 16];
 /// Rays that may differ: hits at edges are decided by rounding.
 const DIFFERENT_GOAL: f64 = 2e-4;
 
@@ -71,15 +73,20 @@ impl Summary {
             Quality::SpatialSplits,
             Quality::Optimized,
         ] {
-            match Bvh::build(&[&scene.mesh], &params_of(quality)) {
-                Ok(tree) => {
-                    places.push((quality, engines.len()));
-                    engines.push(ours(tree));
+            for width in WIDTHS {
+                let mut params = params_of(quality);
+                params.branching_factor = width;
+                match Bvh::build(&[&scene.mesh], &params) {
+                    Ok(tree) => {
+                        places.push(((quality, width), engines.len()));
+                        engines.push(ours(tree));
+                    }
+                    Err(error) => println!("\nno rays through {quality:?}, {width}: {error}"),
                 }
-                Err(error) => println!("\nno rays through {quality:?}: {error}"),
             }
         }
-        let place = |quality| places.iter().find(|p| p.0 == quality).map(|p| p.1);
+        let key = |quality| (quality, judged_width());
+        let place = |quality| places.iter().find(|p| p.0 == key(quality)).map(|p| p.1);
         for set in sets {
             let speed = self.table(scene, &set, &engines);
             let against = |quality, base: usize| Some(speed(place(quality)?, base));
@@ -142,7 +149,7 @@ impl Summary {
             Clock::ThreadCpu.name()
         );
         println!(
-            "  {:<36}{:>10}{:>8}{:>18}{:>10}",
+            "  {:<44}{:>10}{:>8}{:>18}{:>10}",
             "", "Mrays/s", "speed", "quartiles", "differ"
         );
         for (i, engine) in engines.iter().enumerate() {
@@ -165,7 +172,10 @@ impl Summary {
     }
 
     pub(crate) fn judge(&self, goals: &mut Goals) {
-        println!("\nrays: speed at one thread, ours ÷ Embree's, each by its own traversal");
+        println!(
+            "\nrays: speed at one thread, ours ({} children) ÷ Embree's, each by its own traversal",
+            judged_width()
+        );
         for row in &self.rows {
             let optimized = match row.optimized {
                 Some(speed) => format!("{speed:.3}"),
@@ -207,6 +217,14 @@ impl Summary {
     }
 }
 
+/// As many children as one register holds.
+fn judged_width() -> u32 {
+    match Isa::best() {
+        Isa::Avx512 => 16,
+        _ => 8,
+    }
+}
+
 fn differs(got: f32, expected: f32) -> bool {
     // A hit beside a miss is a difference, whatever its distance from infinity.
     got.is_finite() != expected.is_finite() || (got - expected).abs() > 1e-4 * expected.abs()
@@ -216,7 +234,12 @@ fn ours<'a>(tree: Bvh) -> Engine<'a> {
     let tree = std::rc::Rc::new(tree);
     let any = tree.clone();
     Engine {
-        name: format!("raywright {:?}, {}", tree.params().quality, tree.isa()),
+        name: format!(
+            "raywright {:?}, {} children, {}",
+            tree.params().quality,
+            tree.params().branching_factor,
+            tree.isa()
+        ),
         closest: Box::new(move |rays, answers| {
             for (ray, answer) in rays.iter().zip(answers) {
                 *answer = tree.closest_hit(ray).map_or(f32::INFINITY, |hit| hit.t);

@@ -7,9 +7,12 @@ use std::sync::{
     atomic::{AtomicBool, AtomicUsize, Ordering},
 };
 
-use super::{BuildWorkspace, LeafReference, primitive::PrimitiveRef, record::Record};
+use super::{
+    BuildWorkspace, LeafReference, primitive::PrimitiveRef, record::Record, recursion::Lists,
+};
 use crate::{
     error::BuildError,
+    layout::spares::Spares,
     params::{BuildParams, Dynamics, Quality},
 };
 
@@ -30,7 +33,11 @@ pub struct BuildControl {
     pub cancelled: Option<Arc<AtomicBool>>,
     /// Hears how far the build is.
     pub progress: Option<Arc<ProgressFn>>,
-    /// Most bytes that the workspace may take; a build that needs more does not begin.
+    /// Most bytes that the workspace may take; a build that needs more by
+    /// [`BuildWorkspace::bytes_needed`] does not begin. What earlier builds and recycled trees left
+    /// counts too: it is freed where the next build would else pass the limit, so that a limit
+    /// without room for a tree has each tree take new memory. Lists of meshes, 4 bytes for each,
+    /// come on top, and so does the memory of the trees while they are trees.
     pub memory_limit: Option<usize>,
 }
 
@@ -87,6 +94,25 @@ impl BuildControl {
     }
 }
 
+/// The most bytes that a build of each quality has needed since memory was freed last. No buffer is
+/// larger than a build of some quality said, so that the sum is what the buffers are together, at
+/// most.
+#[derive(Debug, Default)]
+pub(crate) struct Announced([usize; Quality::Optimized as usize + 1]);
+
+impl Announced {
+    fn begin_build(&mut self, needed: usize, quality: Quality) {
+        let most = &mut self.0[quality as usize];
+        *most = needed.max(*most);
+    }
+
+    fn sum(&self) -> usize {
+        self.0
+            .iter()
+            .fold(0, |sum, &bytes| sum.saturating_add(bytes))
+    }
+}
+
 impl BuildWorkspace {
     /// Begins a build over `n` primitives: refuses one that is cancelled or needs too much memory,
     /// and forgets the references of the last.
@@ -98,22 +124,59 @@ impl BuildWorkspace {
         {
             return Err(BuildError::MemoryLimit { needed, limit });
         }
+        self.announced.begin_build(needed, params.quality);
+        self.keep_limit(needed, params.quality);
+        self.spares.begin_build();
         self.references.clear();
         Ok(())
+    }
+
+    /// Frees what was kept if the limit might not hold otherwise: first that of trees, then all.
+    fn keep_limit(&mut self, needed: usize, quality: Quality) {
+        let Some(limit) = self.control.memory_limit else {
+            return;
+        };
+        if self.announced.sum() + self.spares.bytes() > limit {
+            self.spares = Spares::default();
+        }
+        if self.announced.sum() > limit {
+            self.free();
+            self.announced.begin_build(needed, quality);
+        }
+    }
+
+    /// Keeps the parts of a tree for the next one, if there is to be one and the limit allows.
+    pub(crate) fn keep_parts(&mut self, params: &BuildParams, keep: impl FnOnce(&mut Spares)) {
+        if params.dynamics == Dynamics::Static {
+            return;
+        }
+        keep(&mut self.spares);
+        if let Some(limit) = self.control.memory_limit
+            && self.bytes() > limit
+        {
+            self.spares = Spares::default();
+        }
+    }
+
+    fn free(&mut self) {
+        *self = Self {
+            control: self.control.clone(),
+            ..Self::default()
+        };
     }
 
     /// Ends a build: frees the memory if the next build is far away.
     pub(crate) fn end(&mut self, params: &BuildParams) {
         if params.dynamics == Dynamics::Static {
-            *self = Self {
-                control: self.control.clone(),
-                ..Self::default()
-            };
+            self.free();
         }
     }
 
-    /// Bytes that a build over `n` primitives takes in the workspace, at most; the tree itself is
-    /// not counted.
+    /// Bytes that a build over `n` primitives takes in the workspace, at most, and in the hands of
+    /// one thread; further threads take some kilobytes more while they build. The tree itself is not
+    /// counted, nor are lists of meshes, 4 bytes for each. Buffers are kept from build to build and
+    /// grow to the largest of them: a workspace that serves several qualities holds up to the sum of
+    /// what each needs, if no [`BuildControl::memory_limit`] forbids it.
     #[must_use]
     pub fn bytes_needed(n: usize, params: &BuildParams) -> usize {
         let capacity = params.reference_capacity(n);
@@ -127,7 +190,8 @@ impl BuildWorkspace {
                 2 * size_of::<PrimitiveRef>() + record + BINARY_BYTES
             }
         };
-        capacity.saturating_mul(per_reference)
+        let lists = Lists::bytes_needed(capacity, params);
+        capacity.saturating_mul(per_reference).saturating_add(lists)
     }
 }
 

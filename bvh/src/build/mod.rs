@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use crate::{
     error::BuildError,
+    layout::spares::Spares,
     params::{BuildParams, Quality, Rounding},
 };
 use binning::{AsEmbree, Exact};
@@ -23,6 +24,7 @@ mod radix;
 pub(crate) mod record;
 pub(crate) mod recursion;
 mod reinsertion;
+mod rotations;
 mod spatial;
 pub(crate) mod tasks;
 
@@ -102,7 +104,8 @@ pub struct LeafReference {
     pub primitive_id: u32,
 }
 
-/// The temporary memory of a build, for reuse by the next one.
+/// The temporary memory of a build, for reuse by the next one, and that of trees that are no longer
+/// needed ([`Bvh::recycle`](crate::Bvh::recycle)).
 #[derive(Debug, Default)]
 pub struct BuildWorkspace {
     /// Cancellation, progress and the limit of memory of the builds in this workspace.
@@ -113,21 +116,33 @@ pub struct BuildWorkspace {
     pub(crate) records: Vec<record::Record>,
     pub(crate) keys: Vec<u64>,
     pub(crate) keys_scratch: Vec<u64>,
+    /// Number of each mesh's first vertex over all meshes, and the total at the end.
+    pub(crate) first_points: Vec<u32>,
+    pub(crate) spares: Spares,
+    lists: recursion::Lists,
     binary: binary::BinaryTree,
     reinsertion: reinsertion::Memory,
     collapse: collapse::Memory,
     agglomerative: agglomerative::Memory,
+    announced: control::Announced,
 }
 
 impl BuildWorkspace {
-    /// Bytes held for the next build.
+    /// Bytes held for the next build, those of recycled trees included.
     #[must_use]
     pub fn bytes(&self) -> usize {
+        self.temporary_bytes() + self.spares.bytes()
+    }
+
+    /// Bytes held apart from those of recycled trees.
+    fn temporary_bytes(&self) -> usize {
         (self.references.capacity() + self.scratch.capacity())
             * size_of::<primitive::PrimitiveRef>()
             + self.leaves.capacity() * size_of::<LeafReference>()
             + self.records.capacity() * size_of::<record::Record>()
             + (self.keys.capacity() + self.keys_scratch.capacity()) * size_of::<u64>()
+            + self.first_points.capacity() * size_of::<u32>()
+            + self.lists.bytes()
             + self.binary.bytes()
             + self.reinsertion.bytes()
             + self.collapse.bytes()

@@ -20,6 +20,7 @@ use super::{
     radix,
     record::Record,
     recursion::{MAX_CHILDREN, RESERVED_LEVELS, depth_error, levels_below},
+    rotations::{self, Place},
     tasks,
 };
 use crate::{error::BuildError, params::BuildParams};
@@ -229,16 +230,19 @@ impl<R: Rounding> Builder<'_, R> {
     ) -> Result<Record, BuildError> {
         let spans = &children.spans[..children.len];
         let (first, parent) = (range.records_begin, range.keys.len());
-        let (own, records) = range.records.split_at_mut(spans.len());
+        let records = range.records;
+        let (own, below) = records.split_at_mut(spans.len());
         let mut rest = Range {
-            records,
+            keys: range.keys,
+            leaves: range.leaves,
+            records: below,
+            begin: range.begin,
             records_begin: first + own.len(),
-            ..range
         };
         if tasks::is_task(parent) {
             self.children_in_parallel(rest, spans, own, level, build)?;
         } else {
-            for (&(begin, n), record) in spans.iter().zip(&mut *own) {
+            for (&(begin, n), record) in spans.iter().zip(own) {
                 let (records, others) = std::mem::take(&mut rest.records).split_at_mut(2 * n - 2);
                 let child = Range {
                     keys: &mut rest.keys[begin..begin + n],
@@ -253,7 +257,17 @@ impl<R: Rounding> Builder<'_, R> {
                 rest.records_begin += 2 * n - 2;
             }
         }
-        Ok(Record::inner_around(first, own))
+        if self.params.rotations > 0 {
+            let place = Place {
+                records,
+                records_begin: first,
+                children: spans.len(),
+                levels: self.params.max_depth.saturating_sub(level),
+            };
+            let is_closed = |child: usize| rotations::is_closed(spans[child].1, parent);
+            rotations::rotate(place, self.params.rotations, is_closed);
+        }
+        Ok(Record::inner_around(first, &records[..spans.len()]))
     }
 
     /// Builds children at the same time. Not inlined, since few nodes need the room on the stack.

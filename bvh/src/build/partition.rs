@@ -120,30 +120,33 @@ fn extend_side<L: Halves>(sides: &mut [L; 2], bounds: L, behind: f32) {
     sides[1] = sides[1].min(bounds.max(L::splat(f32::from_bits(right))));
 }
 
-/// Divides from one buffer into another of the same length, in pieces.
+/// Divides from one buffer into another of the same length, in pieces. `lefts` is memory for the
+/// number of references of each piece that go to the left.
 pub(crate) fn into_buffer(
     from: &[PrimitiveRef],
     to: &mut [PrimitiveRef],
     split: &Split,
     isa: Isa,
+    lefts: &mut Vec<usize>,
 ) -> Partition {
-    let pieces: Vec<&[PrimitiveRef]> = from.chunks(tasks::PIECE_SIZE).collect();
-    let mut lefts = vec![0; pieces.len()];
-    count_left(&pieces, &mut lefts, split);
+    lefts.clear();
+    lefts.resize(from.len().div_ceil(tasks::PIECE_SIZE), 0);
+    count_left(from, lefts, split);
     let left = lefts.iter().sum();
     let (to_left, to_right) = to.split_at_mut(left);
     let to_right = &mut to_right[..from.len() - left];
-    let centroids = copy_pieces(&pieces, &lefts, [to_left, to_right], split, isa);
+    let centroids = copy_pieces(from, lefts, [to_left, to_right], split, isa);
     Partition::new(left, split, centroids)
 }
 
-fn count_left(pieces: &[&[PrimitiveRef]], lefts: &mut [usize], split: &Split) {
-    if let ([piece], [left]) = (pieces, &mut *lefts) {
-        *left = piece.iter().filter(|r| split.is_left(r)).count();
+/// Counts in pieces, of which there are as many as places for the result.
+fn count_left(from: &[PrimitiveRef], lefts: &mut [usize], split: &Split) {
+    if let [left] = lefts {
+        *left = from.iter().filter(|r| split.is_left(r)).count();
         return;
     }
-    let middle = pieces.len() / 2;
-    let (a, b) = pieces.split_at(middle);
+    let middle = lefts.len() / 2;
+    let (a, b) = from.split_at(middle * tasks::PIECE_SIZE);
     let (lefts_a, lefts_b) = lefts.split_at_mut(middle);
     tasks::join(
         || count_left(a, lefts_a, split),
@@ -152,31 +155,31 @@ fn count_left(pieces: &[&[PrimitiveRef]], lefts: &mut [usize], split: &Split) {
 }
 
 fn copy_pieces(
-    pieces: &[&[PrimitiveRef]],
+    from: &[PrimitiveRef],
     lefts: &[usize],
     [to_left, to_right]: [&mut [PrimitiveRef]; 2],
     split: &Split,
     isa: Isa,
 ) -> [Bounds; 2] {
-    if let [piece] = pieces {
+    if lefts.len() == 1 {
         let kernel = CopyPiece {
-            piece,
+            piece: from,
             to_left,
             to_right,
             split,
         };
         return simd::build::run(isa, kernel);
     }
-    let middle = pieces.len() / 2;
+    let middle = lefts.len() / 2;
+    let (from_a, from_b) = from.split_at(middle * tasks::PIECE_SIZE);
     let left_count: usize = lefts[..middle].iter().sum();
-    let right_count = pieces[..middle].iter().map(|p| p.len()).sum::<usize>() - left_count;
+    let right_count = from_a.len() - left_count;
     let (left_a, left_b) = to_left.split_at_mut(left_count);
     let (right_a, right_b) = to_right.split_at_mut(right_count);
-    let (pieces_a, pieces_b) = pieces.split_at(middle);
     let (lefts_a, lefts_b) = lefts.split_at(middle);
     let (a, b) = tasks::join(
-        || copy_pieces(pieces_a, lefts_a, [left_a, right_a], split, isa),
-        || copy_pieces(pieces_b, lefts_b, [left_b, right_b], split, isa),
+        || copy_pieces(from_a, lefts_a, [left_a, right_a], split, isa),
+        || copy_pieces(from_b, lefts_b, [left_b, right_b], split, isa),
     );
     std::array::from_fn(|side| {
         let mut bounds = a[side];

@@ -28,6 +28,8 @@ pub(crate) struct Record {
     /// Triangle blocks of the subtree.
     pub(crate) blocks: u32,
     pub(crate) kind: Kind,
+    /// Levels of the subtree below this one; `u8::MAX` if there are more.
+    pub(crate) height: u8,
 }
 
 impl Record {
@@ -39,6 +41,7 @@ impl Record {
         nodes: 0,
         blocks: 0,
         kind: Kind::Leaf,
+        height: 0,
     };
 
     pub(crate) fn leaf(bounds: &Bounds, first: usize, count: usize) -> Self {
@@ -59,6 +62,7 @@ impl Record {
             nodes: 1 + children.iter().map(|c| c.nodes).sum::<u32>(),
             blocks: children.iter().map(|c| c.blocks).sum(),
             kind: Kind::Inner,
+            height: (children.iter().map(|c| c.height).max()).map_or(0, |h| h.saturating_add(1)),
             ..Self::of(bounds)
         }
     }

@@ -18,7 +18,11 @@ use super::{
     spatial::{self, Cutting, SpatialSplit},
     tasks,
 };
-use crate::{error::BuildError, params::BuildParams, simd::Isa};
+use crate::{
+    error::BuildError,
+    params::{BuildParams, Quality},
+    simd::Isa,
+};
 
 /// Levels kept free below a tree built by costs, in which oversized ranges are halved.
 pub(crate) const RESERVED_LEVELS: u32 = 8;
@@ -141,7 +145,15 @@ where
         len: n,
         bounds,
     };
-    builder.subtree(root, &mut Memory::default(), 1)
+    let mut memory = Memory {
+        lists: std::mem::take(&mut workspace.lists),
+        ..Memory::default()
+    };
+    let root = builder.subtree(root, &mut memory, 1);
+    // A build that failed leaves some.
+    memory.lists.children.clear();
+    workspace.lists = memory.lists;
+    root
 }
 
 /// A range of references, and all memory that belongs to the subtree over it alone.
@@ -162,7 +174,7 @@ struct Subtree<'a> {
 }
 
 /// A part of the range of a subtree: a child of the node that is being made.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Span {
     /// Place of the first reference within the subtree.
     first: usize,
@@ -282,9 +294,40 @@ impl Split {
 struct Memory {
     bins: binning::BinPair,
     spatial_bins: spatial::Bins,
+    lists: Lists,
+}
+
+/// What of it is on the heap, and is reused from build to build.
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
     /// The children of all nodes that are being made, those of the deepest node last. Here and not
     /// on the stack, which a deep tree would else exhaust.
     children: Vec<Span>,
+    /// How many references of each piece of a range go to the left.
+    lefts: Vec<usize>,
+}
+
+impl Lists {
+    pub(crate) fn bytes(&self) -> usize {
+        self.children.capacity() * size_of::<Span>() + self.lefts.capacity() * size_of::<usize>()
+    }
+
+    /// Bytes that they take over `n` references, at most. The children of one node per level are
+    /// there at a time; those that are not divided have references of their own, and none is divided
+    /// without a sibling. A vector doubles when it grows.
+    pub(crate) fn bytes_needed(n: usize, params: &BuildParams) -> usize {
+        const SMALLEST_VECTOR: usize = 4;
+        let [width, levels] = match params.quality {
+            Quality::Morton | Quality::Agglomerative => return 0,
+            Quality::BinnedSah | Quality::SpatialSplits => {
+                [params.branching_factor, params.max_depth]
+            }
+            Quality::Optimized => [2, BINARY_LEVELS],
+        };
+        let children = n.saturating_mul(2).min(width as usize * levels as usize);
+        2 * children.max(SMALLEST_VECTOR) * size_of::<Span>()
+            + n.div_ceil(tasks::PIECE_SIZE) * size_of::<usize>()
+    }
 }
 
 impl Memory {
@@ -297,7 +340,7 @@ impl Memory {
         value: impl Fn(&Span) -> f32,
     ) -> Option<usize> {
         let mut best: Option<(usize, f32)> = None;
-        for (index, span) in self.children.iter().enumerate().skip(base) {
+        for (index, span) in self.lists.children.iter().enumerate().skip(base) {
             if qualifies(span) {
                 let value = value(span);
                 if best.is_none_or(|(_, other)| value > other) {
@@ -353,7 +396,13 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
     }
 
     /// Divides a span by a plane, or halves it in sorted order if there is none.
-    fn divide(&self, of: &mut Subtree<'_>, mut span: Span, split: Option<Split>) -> [Span; 2] {
+    fn divide(
+        &self,
+        of: &mut Subtree<'_>,
+        mut span: Span,
+        split: Option<Split>,
+        lefts: &mut Vec<usize>,
+    ) -> [Span; 2] {
         let [memory, scratch] = of.memory(&span);
         let partition = match (split, &self.cutting) {
             (Some(Split::Object(split)), _) => {
@@ -362,7 +411,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
                     partition::in_place(references, |reference| split.is_left(reference))
                 } else if tasks::in_pieces(span.len) {
                     span.in_scratch = !span.in_scratch;
-                    partition::into_buffer(references, scratch, &split, self.isa)
+                    partition::into_buffer(references, scratch, &split, self.isa, lefts)
                 } else {
                     partition::stable(references, scratch, &split, self.isa)
                 }
@@ -426,10 +475,10 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             subtree.sort::<R>(&span);
             return self.leaf_phase(subtree, memory, level);
         }
-        let base = memory.children.len();
-        let halves = self.divide(&mut subtree, span, split);
-        memory.children.extend(halves);
-        while memory.children.len() - base < self.params.branching_factor as usize {
+        let base = memory.lists.children.len();
+        let halves = self.divide(&mut subtree, span, split, &mut memory.lists.lefts);
+        memory.lists.children.extend(halves);
+        while memory.lists.children.len() - base < self.params.branching_factor as usize {
             // The largest box first; ties keep the older child.
             let Some(largest) = memory.best(
                 base,
@@ -438,13 +487,13 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             ) else {
                 break;
             };
-            let child = memory.children[largest];
+            let child = memory.lists.children[largest];
             let split = self.find_split(&subtree, &child, memory);
-            let [left, right] = self.divide(&mut subtree, child, split);
-            memory.children[largest] = left;
-            memory.children.push(right);
+            let [left, right] = self.divide(&mut subtree, child, split, &mut memory.lists.lefts);
+            memory.lists.children[largest] = left;
+            memory.lists.children.push(right);
         }
-        memory.children[base..].sort_by_key(|child| std::cmp::Reverse(child.len));
+        memory.lists.children[base..].sort_by_key(|child| std::cmp::Reverse(child.len));
         self.node(subtree, memory, base, level, Self::subtree)
     }
 
@@ -472,16 +521,16 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             }
             return Ok(Record::leaf(&subtree.bounds.geometry, subtree.begin, n));
         }
-        let base = memory.children.len();
-        memory.children.extend(subtree.halve(&span));
-        while memory.children.len() - base < self.params.branching_factor as usize {
+        let base = memory.lists.children.len();
+        memory.lists.children.extend(subtree.halve(&span));
+        while memory.lists.children.len() - base < self.params.branching_factor as usize {
             let too_large = |child: &Span| child.len > max_leaf_size;
             let Some(largest) = memory.best(base, too_large, |child| child.len as f32) else {
                 break;
             };
             // The last child takes its place, and its halves come to the end.
-            let child = memory.children.swap_remove(largest);
-            memory.children.extend(subtree.halve(&child));
+            let child = memory.lists.children.swap_remove(largest);
+            memory.lists.children.extend(subtree.halve(&child));
         }
         self.node(subtree, memory, base, level, Self::leaf_phase)
     }
@@ -497,7 +546,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
     ) -> Result<Record, BuildError> {
         let bounds = subtree.bounds.geometry;
         let records_begin = subtree.records_begin;
-        let count = memory.children.len() - base;
+        let count = memory.lists.children.len() - base;
         let (own, rest) = subtree.records.split_at_mut(count);
         let mut rest = Subtree {
             records: rest,
@@ -508,7 +557,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             self.children_in_parallel(rest, own, memory, base, level, build)?;
         } else {
             for (place, record) in own.iter_mut().enumerate() {
-                let child = memory.children[base + place];
+                let child = memory.lists.children[base + place];
                 let (n, records) = (child.len, 2 * child.capacity - 2);
                 let range = child.first..child.first + child.capacity;
                 let (mut references, mut scratch) = (
@@ -534,7 +583,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
                 rest.records_begin += records;
             }
         }
-        memory.children.truncate(base);
+        memory.lists.children.truncate(base);
         Ok(Record::inner(&bounds, records_begin, own))
     }
 
@@ -549,7 +598,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         level: u32,
         build: BuildSubtree<Self>,
     ) -> Result<(), BuildError> {
-        let children = &memory.children[base..];
+        let children = &memory.lists.children[base..];
         // Slices are cut off in the order of the references, records in that of the children.
         let mut in_order: [usize; MAX_CHILDREN] = std::array::from_fn(|i| i);
         in_order[..children.len()].sort_unstable_by_key(|&i| children[i].first);

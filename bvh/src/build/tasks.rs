@@ -11,13 +11,18 @@ pub(crate) const PIECES_FROM: usize = 1 << 16;
 /// Size of a piece.
 pub(crate) const PIECE_SIZE: usize = 1 << 14;
 
-/// Runs both, at the same time if the pool has threads.
+/// Runs both, at the same time if the pool has several threads. A single one would only hand the
+/// work to itself.
 #[cfg(feature = "parallel")]
 pub(crate) fn join<A: Send, B: Send>(
     a: impl FnOnce() -> A + Send,
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
-    rayon::join(a, b)
+    if threads() > 1 {
+        rayon::join(a, b)
+    } else {
+        (a(), b())
+    }
 }
 
 /// Runs both in turn.

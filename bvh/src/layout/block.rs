@@ -39,6 +39,9 @@ pub(crate) trait Primitives: Sync {
     /// Asks for the data of a primitive before it is needed.
     fn prefetch(&self, leaf: LeafReference);
 
-    /// All points that indexed blocks refer to, and one for the unused lanes at the end.
-    fn points(&self) -> Vec<Point>;
+    /// How many points indexed blocks refer to, that for the unused lanes included.
+    fn point_count(&self) -> usize;
+
+    /// All these points, in order; that for the unused lanes is the last.
+    fn points(&self) -> impl Iterator<Item = Point>;
 }

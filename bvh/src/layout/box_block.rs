@@ -21,8 +21,12 @@ impl Primitives for Boxes<'_> {
         prefetch(&self.boxes[leaf.primitive_id as usize]);
     }
 
-    fn points(&self) -> Vec<Point> {
-        vec![]
+    fn point_count(&self) -> usize {
+        0
+    }
+
+    fn points(&self) -> impl Iterator<Item = Point> {
+        std::iter::empty()
     }
 }
 

@@ -6,6 +6,7 @@
 use super::{
     block::{BLOCK_SIZE, BlockOf, Primitives},
     node::{ChildRef, Node, half_area, ranks},
+    spares::{Part, Spares},
     tree::Tree,
 };
 use crate::{
@@ -41,13 +42,17 @@ struct Slots<'a, const N: usize, const W: usize, B> {
 }
 
 impl<P: Primitives> Source<'_, P> {
-    /// The tree of a build.
+    /// The tree of a build, in spare memory where there is some.
     ///
     /// # Errors
     /// [`BuildError::TreeTooLarge`] if references cannot number its parts.
-    pub(crate) fn emit<const N: usize, const W: usize, B: BlockOf<P>>(
+    pub(crate) fn emit<const N: usize, const W: usize, B: BlockOf<P> + Part>(
         &self,
-    ) -> Result<Tree<N, W, B>, BuildError> {
+        spares: &mut Spares,
+    ) -> Result<Tree<N, W, B>, BuildError>
+    where
+        Node<N, W>: Part,
+    {
         let mut tree = Tree {
             nodes: vec![],
             blocks: vec![],
@@ -60,10 +65,13 @@ impl<P: Primitives> Source<'_, P> {
         check_count("nodes", nodes, ChildRef::NODE_LIMIT)?;
         check_count("blocks of primitives", blocks, ChildRef::BLOCK_LIMIT)?;
         // A tree that is a single leaf gets a node above it, so that traversal starts the same way.
-        tree.nodes.resize(nodes.max(1), Node::default());
-        tree.blocks.resize(blocks, B::new(&[], &self.primitives));
+        // Subtrees fill their parts of both arrays whole, since the counts of a record are those of
+        // its children: nothing of an older tree is left.
+        tree.nodes = spares.take_filled(nodes.max(1), Node::default());
+        tree.blocks = spares.take_filled(blocks, B::new(&[], &self.primitives));
         if B::INDEXED {
-            tree.points = self.primitives.points();
+            tree.points = spares.take_empty(self.primitives.point_count());
+            tree.points.extend(self.primitives.points());
         }
         let slots = Slots {
             nodes: &mut tree.nodes,
@@ -239,7 +247,7 @@ mod tests {
                 scale: 1.0,
             },
         };
-        source.emit::<8, 8, EdgeBlock>().err()
+        source.emit::<8, 8, EdgeBlock>(&mut Spares::default()).err()
     }
 
     #[test]

@@ -82,6 +82,15 @@ impl<const N: usize, const W: usize> Node<N, W> {
     /// Bits of the order of one octant: 64 for N = 16, 32 for N = 8, 8 for N = 4 and 2.
     const OCTANT_BITS: usize = 4 * W;
     const SLOT_BITS: u32 = N.trailing_zeros();
+    /// The order that takes slots as they lie.
+    pub(crate) const SLOT_ORDER: u64 = {
+        let (mut order, mut slot) = (0, 0);
+        while slot < N as u64 {
+            order |= slot << (slot * Self::SLOT_BITS as u64);
+            slot += 1;
+        }
+        order
+    };
 
     /// The slots from the farthest to the nearest for rays of an octant: fields of log2(N) bits,
     /// lowest first. Bit a of `octant` is set if the direction is negative along axis a.

@@ -27,7 +27,9 @@ impl<const N: usize, const W: usize, B: Block> Tree<N, W, B> {
         B: BlockOf<Triangles<'t>>,
     {
         if B::INDEXED && !self.nodes.is_empty() {
-            self.points = triangles.points();
+            self.points.clear();
+            self.points.reserve_exact(triangles.point_count());
+            self.points.extend(triangles.points());
         }
         let mut block_bounds = vec![Aabb::EMPTY; self.blocks.len()];
         refit_blocks(&mut self.blocks, &mut block_bounds, triangles);

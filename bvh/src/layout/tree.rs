@@ -3,6 +3,7 @@
 use super::{
     block::{Block, Point},
     node::{ChildRef, Node},
+    spares::{Part, Spares},
 };
 
 /// Nodes depth first, the root first; an empty scene has no node. Coordinates are scaled by the
@@ -22,6 +23,17 @@ impl<const N: usize, const W: usize, B: Block> Tree<N, W, B> {
         (0..N)
             .filter(|&slot| !node.child_bounds(slot).is_empty())
             .map(|slot| (slot, ChildRef(node.children[slot])))
+    }
+
+    /// Gives up the tree for its memory.
+    pub(crate) fn recycle(self, spares: &mut Spares)
+    where
+        Node<N, W>: Part,
+        B: Part,
+    {
+        spares.keep(self.nodes);
+        spares.keep(self.blocks);
+        spares.keep(self.points);
     }
 
     pub(crate) fn bytes(&self) -> usize {

@@ -92,10 +92,14 @@ impl Primitives for Triangles<'_> {
         }
     }
 
-    fn points(&self) -> Vec<Point> {
+    fn point_count(&self) -> usize {
+        self.unused_point() as usize + 1
+    }
+
+    fn points(&self) -> impl Iterator<Item = Point> {
         let vertices = self.meshes.iter().flat_map(|mesh| mesh.vertices());
         let scaled = vertices.map(|&v| (v * self.scale).to_array());
-        scaled.chain([[UNUSED; 3]]).collect()
+        scaled.chain([[UNUSED; 3]])
     }
 }
 

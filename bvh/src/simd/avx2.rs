@@ -9,9 +9,9 @@ use std::arch::x86_64::{
     __m128, __m256, __m256i, _CMP_LE_OQ, _CMP_NEQ_OQ, _mm_add_ps, _mm_and_ps, _mm_andnot_ps,
     _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_max_ps, _mm_min_ps, _mm_movemask_ps,
     _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps, _mm_sub_ps, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
-    _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps,
-    _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_max_ps,
-    _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
+    _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps,
+    _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256,
+    _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
     _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
     _mm256_slli_epi32, _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256,
     _mm256_sub_ps, _mm256_xor_ps,
@@ -43,7 +43,7 @@ pub(crate) struct Mask8(__m256);
 macro_rules! lanes_by_intrinsics {
     ($lanes:ident, $mask:ident, $n:literal, $set1:ident, $load:ident, $store:ident, $add:ident, $sub:ident,
      $mul:ident, $div:ident, $fmadd:ident, $min:ident, $max:ident, $and:ident, $andnot:ident, $xor:ident,
-     $cmp:ident, $and_mask:ident, $movemask:ident $(, $push:item)*) => {
+     $cmp:ident, $and_mask:ident, $movemask:ident $(, $push:item)?) => {
         impl std::ops::BitAnd for $mask {
             type Output = Self;
             #[inline(always)]
@@ -136,7 +136,7 @@ macro_rules! lanes_by_intrinsics {
                 // SAFETY: as `add`.
                 (unsafe { $movemask(mask.0) }) as u32
             }
-            $($push)*
+            $($push)?
         }
     };
 }
@@ -185,45 +185,30 @@ lanes_by_intrinsics!(
     _mm256_cmp_ps,
     _mm256_and_ps,
     _mm256_movemask_ps,
-    /// Sorts by one permutation and closes the gaps by another, without a branch. The comparison
-    /// is made again on what is sorted: that is sooner done than sorting its bits.
+    /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(self, leave: Self, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
         // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
-        let (enter, references, sorted) = unsafe {
+        let (slots, children) = unsafe {
             let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            // A permutation looks at the lowest three bits of each field.
-            let slots = _mm256_srlv_epi32(_mm256_set1_epi32(order as u32 as i32), fields);
-            let enter = Self(_mm256_permutevar8x32_ps(self.0, slots));
-            let leave = Self(_mm256_permutevar8x32_ps(leave.0, slots));
-            let children = _mm256_loadu_si256(children.as_ptr().cast::<__m256i>());
-            let references = _mm256_permutevar8x32_epi32(children, slots);
-            (enter, references, Self::bits(enter.le(leave)))
+            let order = _mm256_set1_epi32(order as u32 as i32);
+            (
+                _mm256_and_si256(_mm256_srlv_epi32(order, fields), _mm256_set1_epi32(7)),
+                _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()),
+            )
         };
-        push_entered(stack, references, enter.0, sorted);
-    },
-    /// Closes the gaps.
-    #[inline(always)]
-    fn push_in_slot_order(self, leave: Self, children: &[u32; 8], stack: &mut Stack<8>) {
+        let sorted = sorted_mask(mask, slots);
         // SAFETY: as above.
-        let children = unsafe { _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()) };
-        push_entered(stack, children, self.0, Self::bits(self.le(leave)));
+        let (references, distances) = unsafe {
+            let slots = _mm256_permutevar8x32_epi32(slots, closing(sorted));
+            (
+                _mm256_permutevar8x32_epi32(children, slots),
+                _mm256_permutevar8x32_ps(self.0, slots),
+            )
+        };
+        push_eight(stack, references, distances, mask.count_ones());
     }
 );
-
-/// Pushes those of eight entries whose bit of `mask` is set.
-#[inline(always)]
-fn push_entered(stack: &mut Stack<8>, references: __m256i, distances: __m256, mask: u32) {
-    let close = closing(mask);
-    // SAFETY: AVX2 is available wherever a vector of this module exists (file header).
-    let (references, distances) = unsafe {
-        (
-            _mm256_permutevar8x32_epi32(references, close),
-            _mm256_permutevar8x32_ps(distances, close),
-        )
-    };
-    push_eight(stack, references, distances, mask.count_ones());
-}
 
 impl Half for F32x8 {
     #[inline(always)]

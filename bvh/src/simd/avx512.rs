@@ -10,23 +10,20 @@
 //! the operations may be safe functions.
 
 use std::arch::x86_64::{
-    __m128, __m128i, __m256, __m256i, __m512, __m512i, __mmask16, _CMP_LE_OQ, _CMP_NEQ_OQ,
-    _cvtmask16_u32, _kand_mask16, _mm_add_ps, _mm_and_ps, _mm_andnot_ps, _mm_castps_si128,
-    _mm_castsi128_ps, _mm_cmp_ps, _mm_cmp_ps_mask, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps,
-    _mm_loadu_si128, _mm_maskz_compress_epi32, _mm_maskz_compress_ps, _mm_max_ps, _mm_min_ps,
-    _mm_movemask_ps, _mm_mul_ps, _mm_permutevar_ps, _mm_set1_epi32, _mm_set1_ps, _mm_setr_epi32,
-    _mm_srlv_epi32, _mm_storeu_ps, _mm_storeu_si128, _mm_sub_ps, _mm_xor_ps, _mm256_add_ps,
-    _mm256_and_ps, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_cmp_ps_mask, _mm256_div_ps,
-    _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256, _mm256_maskz_compress_epi32,
-    _mm256_maskz_compress_ps, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_permutevar8x32_epi32, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps,
-    _mm256_setr_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256, _mm256_sub_ps,
-    _mm256_xor_ps, _mm512_add_ps, _mm512_and_ps, _mm512_andnot_ps, _mm512_cmp_ps_mask,
-    _mm512_div_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_loadu_si512, _mm512_mask_set1_epi32,
-    _mm512_maskz_compress_epi32, _mm512_maskz_compress_ps, _mm512_max_ps, _mm512_min_ps,
-    _mm512_mul_ps, _mm512_permutexvar_epi32, _mm512_permutexvar_ps, _mm512_set1_epi32,
-    _mm512_set1_ps, _mm512_setr_epi32, _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_storeu_si512,
-    _mm512_sub_ps, _mm512_xor_ps,
+    __m128, __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_NEQ_OQ, _cvtmask16_u32, _kand_mask16,
+    _mm_add_ps, _mm_and_ps, _mm_and_si128, _mm_andnot_ps, _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps,
+    _mm_loadu_ps, _mm_maskz_compress_epi32, _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps,
+    _mm_permutevar_ps, _mm_set1_epi32, _mm_set1_ps, _mm_setr_epi32, _mm_sllv_epi32, _mm_srlv_epi32,
+    _mm_storeu_ps, _mm_sub_ps, _mm_test_epi32_mask, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
+    _mm256_and_si256, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps,
+    _mm256_loadu_ps, _mm256_maskz_compress_epi32, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
+    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
+    _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_test_epi32_mask,
+    _mm256_xor_ps, _mm512_add_ps, _mm512_and_ps, _mm512_and_si512, _mm512_andnot_ps,
+    _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_set1_epi32,
+    _mm512_maskz_compress_epi32, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps,
+    _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setr_epi32, _mm512_sllv_epi32,
+    _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_xor_ps,
 };
 
 use super::{Lanes, avx2::lanes_by_intrinsics, stack::Stack};
@@ -75,27 +72,24 @@ lanes_by_intrinsics!(
     _mm_cmp_ps,
     _mm_and_ps,
     _mm_movemask_ps,
-    /// Sorts by permutations, which look at the lowest bits of a slot, and closes the gaps by
-    /// compression, without a branch. The comparison is made on what is sorted: that is sooner
-    /// done than sorting its bits.
+    /// Sorts by one permutation and closes the gaps by compression, without a branch.
     #[inline(always)]
-    fn push_children(self, leave: Self, children: &[u32; 4], order: u64, stack: &mut Stack<4>) {
-        // SAFETY: the instructions are available (file header).
-        let (children, enter, leave) = unsafe {
+    fn push_children(self, mask: u32, children: &[u32; 4], order: u64, stack: &mut Stack<4>) {
+        let (reference, distance) = stack.top(4);
+        // SAFETY: the instructions are available (file header). The load reads the four words of
+        // `children`. By the invariant of the stack, N = 4 entries from the top on lie inside each
+        // array; all four are written, and at most four are counted in.
+        unsafe {
             let order = _mm_set1_epi32(order as u32 as i32);
             let slots = _mm_srlv_epi32(order, _mm_setr_epi32(0, 2, 4, 6));
-            (
-                _mm_castps_si128(_mm_permutevar_ps(_mm_castsi128_ps(load_4(children)), slots)),
-                Self(_mm_permutevar_ps(self.0, slots)),
-                Self(_mm_permutevar_ps(leave.0, slots)),
-            )
-        };
-        push_4(stack, children, enter, leave);
-    },
-    /// Closes the gaps.
-    #[inline(always)]
-    fn push_in_slot_order(self, leave: Self, children: &[u32; 4], stack: &mut Stack<4>) {
-        push_4(stack, load_4(children), self, leave);
+            let bits = _mm_sllv_epi32(_mm_set1_epi32(1), _mm_and_si128(slots, _mm_set1_epi32(3)));
+            let entered = _mm_test_epi32_mask(bits, _mm_set1_epi32(mask as i32));
+            let slots = _mm_maskz_compress_epi32(entered, slots);
+            let children = _mm_loadu_ps(children.as_ptr().cast::<f32>());
+            _mm_storeu_ps(reference.cast::<f32>(), _mm_permutevar_ps(children, slots));
+            _mm_storeu_ps(distance, _mm_permutevar_ps(self.0, slots));
+            stack.grow(mask.count_ones());
+        }
     }
 );
 
@@ -121,23 +115,22 @@ lanes_by_intrinsics!(
     _mm256_movemask_ps,
     /// As with four lanes.
     #[inline(always)]
-    fn push_children(self, leave: Self, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
-        // SAFETY: the instructions are available (file header).
-        let (children, enter, leave) = unsafe {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+        let (reference, distance) = stack.top(8);
+        // SAFETY: as with four lanes, for eight.
+        unsafe {
             let order = _mm256_set1_epi32(order as u32 as i32);
             let slots = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
-            (
-                _mm256_permutevar8x32_epi32(load_8(children), slots),
-                Self(_mm256_permutevar8x32_ps(self.0, slots)),
-                Self(_mm256_permutevar8x32_ps(leave.0, slots)),
-            )
-        };
-        push_8(stack, children, enter, leave);
-    },
-    /// Closes the gaps.
-    #[inline(always)]
-    fn push_in_slot_order(self, leave: Self, children: &[u32; 8], stack: &mut Stack<8>) {
-        push_8(stack, load_8(children), self, leave);
+            let lanes = _mm256_and_si256(slots, _mm256_set1_epi32(7));
+            let bits = _mm256_sllv_epi32(_mm256_set1_epi32(1), lanes);
+            let entered = _mm256_test_epi32_mask(bits, _mm256_set1_epi32(mask as i32));
+            let slots = _mm256_maskz_compress_epi32(entered, slots);
+            let children = _mm256_loadu_ps(children.as_ptr().cast::<f32>());
+            let children = _mm256_permutevar8x32_ps(children, slots);
+            _mm256_storeu_ps(reference.cast::<f32>(), children);
+            _mm256_storeu_ps(distance, _mm256_permutevar8x32_ps(self.0, slots));
+            stack.grow(mask.count_ones());
+        }
     }
 );
 
@@ -163,95 +156,24 @@ lanes_by_intrinsics!(
     _cvtmask16_u32,
     /// As with four lanes; the upper eight slots are in the upper half of `order`.
     #[inline(always)]
-    fn push_children(self, leave: Self, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
-        // SAFETY: the instructions are available (file header).
-        let (children, enter, leave) = unsafe {
+    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
+        let (reference, distance) = stack.top(16);
+        // SAFETY: as with four lanes, for sixteen.
+        unsafe {
             let fields =
                 _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
             let low = _mm512_set1_epi32(order as u32 as i32);
             let order = _mm512_mask_set1_epi32(low, 0xff00, (order >> 32) as i32);
             let slots = _mm512_srlv_epi32(order, fields);
-            (
-                _mm512_permutexvar_epi32(slots, load_16(children)),
-                Self(_mm512_permutexvar_ps(slots, self.0)),
-                Self(_mm512_permutexvar_ps(slots, leave.0)),
-            )
-        };
-        push_16(stack, children, enter, leave);
-    },
-    /// Closes the gaps.
-    #[inline(always)]
-    fn push_in_slot_order(self, leave: Self, children: &[u32; 16], stack: &mut Stack<16>) {
-        push_16(stack, load_16(children), self, leave);
+            let lanes = _mm512_and_si512(slots, _mm512_set1_epi32(15));
+            let bits = _mm512_sllv_epi32(_mm512_set1_epi32(1), lanes);
+            let entered = _mm512_test_epi32_mask(bits, _mm512_set1_epi32(mask as i32));
+            let slots = _mm512_maskz_compress_epi32(entered, slots);
+            let children = _mm512_loadu_ps(children.as_ptr().cast::<f32>());
+            let children = _mm512_permutexvar_ps(slots, children);
+            _mm512_storeu_ps(reference.cast::<f32>(), children);
+            _mm512_storeu_ps(distance, _mm512_permutexvar_ps(slots, self.0));
+            stack.grow(mask.count_ones());
+        }
     }
-);
-
-/// Loads the references of children, and pushes those of them that are entered before they are
-/// left.
-macro_rules! pushes {
-    ($load:ident, $push:ident, $n:literal, $lanes:ident, $integers:ident, $loadu:ident,
-     $cmp:ident, $compress_integers:ident, $compress:ident, $store_integers:ident, $store:ident) => {
-        #[inline(always)]
-        fn $load(children: &[u32; $n]) -> $integers {
-            // SAFETY: the instructions are available where this is called (file header). The load
-            // reads the words of `children` and asks for no alignment.
-            unsafe { $loadu(children.as_ptr().cast()) }
-        }
-
-        #[inline(always)]
-        fn $push(stack: &mut Stack<$n>, children: $integers, enter: $lanes, leave: $lanes) {
-            let (reference, distance) = stack.top($n);
-            // SAFETY: the instructions are available (file header). By the invariant of the stack,
-            // N entries from the top on lie inside each array; all of them are written, and at
-            // most N are counted in.
-            unsafe {
-                let entered = $cmp::<_CMP_LE_OQ>(enter.0, leave.0);
-                $store_integers(reference.cast(), $compress_integers(entered, children));
-                $store(distance, $compress(entered, enter.0));
-                stack.grow(u32::from(entered).count_ones());
-            }
-        }
-    };
-}
-
-pushes!(
-    load_4,
-    push_4,
-    4,
-    F32x4,
-    __m128i,
-    _mm_loadu_si128,
-    _mm_cmp_ps_mask,
-    _mm_maskz_compress_epi32,
-    _mm_maskz_compress_ps,
-    _mm_storeu_si128,
-    _mm_storeu_ps
-);
-
-pushes!(
-    load_8,
-    push_8,
-    8,
-    F32x8,
-    __m256i,
-    _mm256_loadu_si256,
-    _mm256_cmp_ps_mask,
-    _mm256_maskz_compress_epi32,
-    _mm256_maskz_compress_ps,
-    _mm256_storeu_si256,
-    _mm256_storeu_ps
-);
-
-pushes!(
-    load_16,
-    push_16,
-    16,
-    F32x16,
-    __m512i,
-    _mm512_loadu_si512,
-    _mm512_cmp_ps_mask,
-    _mm512_maskz_compress_epi32,
-    _mm512_maskz_compress_ps,
-    _mm512_storeu_si512,
-    _mm512_storeu_ps
 );

@@ -57,18 +57,17 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     /// Bit i of the result is lane i.
     fn bits(mask: Self::Mask) -> u32;
 
-    /// Pushes onto a stack the children that are entered (at distances `self`) before they are
-    /// left, in the order of the child numbers that `order` holds in fields of `log2(N)` bits,
-    /// lowest field first.
+    /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
+    /// `self`, in the order of the child numbers that `order` holds in fields of
+    /// `log2(N)` bits, lowest field first.
     #[inline(always)]
     fn push_children(
         self,
-        leave: Self,
+        mask: u32,
         children: &[u32; N],
         order: u64,
         stack: &mut stack::Stack<N>,
     ) {
-        let mask = Self::bits(self.le(leave));
         let distances = self.store();
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
@@ -76,22 +75,6 @@ pub(crate) trait Lanes<const N: usize>: Copy {
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
     }
-
-    /// The same in the order in which they lie.
-    #[inline(always)]
-    fn push_in_slot_order(self, leave: Self, children: &[u32; N], stack: &mut stack::Stack<N>) {
-        self.push_children(leave, children, slot_order::<N>(), stack);
-    }
-}
-
-/// The order that takes slots as they lie.
-const fn slot_order<const N: usize>() -> u64 {
-    let (mut order, mut slot) = (0, 0);
-    while slot < N as u64 {
-        order |= slot << (slot * N.trailing_zeros() as u64);
-        slot += 1;
-    }
-    order
 }
 
 /// Each of three values in every lane.

@@ -252,8 +252,7 @@ impl<L: Half> Lanes<16> for Halves<L> {
         L::bits(mask.0) | L::bits(mask.1) << 8
     }
     #[inline(always)]
-    fn push_children(self, leave: Self, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
-        let mask = Self::bits(self.le(leave));
+    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
         L::push_children_of_both(self, mask, children, order, stack);
     }
 }

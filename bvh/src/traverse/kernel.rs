@@ -13,7 +13,7 @@
 //! is always inlined, a closure may be compiled by itself, without the instruction set of the
 //! kernel, and then each operation becomes a call (seen: 7 times slower).
 
-use glam::Vec3A;
+use glam::Vec3;
 
 use super::triangle::{BlockHits, NODE_PAD, TriangleTest};
 use crate::{
@@ -59,48 +59,45 @@ impl RaySetup {
     /// interval, or an origin so far away that it has no precision left.
     #[inline]
     pub(crate) fn new(ray: &Ray, scale: f32) -> Option<Self> {
-        let origin = Vec3A::from(ray.origin) * scale;
-        let given = Vec3A::from(ray.direction);
-        let largest = given.abs().max_element();
+        let origin = ray.origin * scale;
+        let largest = ray.direction.abs().max_element();
         let t_min = ray.t_min.max(0.0);
         // Comparisons are written so that NaN fails them; max_element may drop a NaN, so the
         // components are asked too.
         let usable = largest > 0.0
-            && given.is_finite()
-            && origin.abs().cmple(Vec3A::splat(FARTHEST_ORIGIN)).all()
+            && ray.direction.is_finite()
+            && origin.abs().cmple(Vec3::splat(FARTHEST_ORIGIN)).all()
             && t_min <= ray.t_max
             && !ray.t_min.is_nan();
         if !usable {
             return None;
         }
         let [direction_scale, lift] = direction_scale(largest);
-        let direction = given * lift * direction_scale;
-        let smallest = Vec3A::splat(SMALLEST_COMPONENT);
-        let reciprocal = Vec3A::select(
-            direction.abs().cmplt(smallest),
-            smallest.copysign(direction),
-            direction,
-        )
-        .recip();
-        let margin = (Vec3A::splat(COORDINATE_BOUND) + origin.abs()) * reciprocal.abs();
+        let direction = ray.direction * lift * direction_scale;
+        let reciprocal = direction.to_array().map(|d| {
+            if d.abs() < SMALLEST_COMPONENT {
+                SMALLEST_COMPONENT.copysign(d)
+            } else {
+                d
+            }
+            .recip()
+        });
+        let margin = std::array::from_fn(|axis| {
+            (COORDINATE_BOUND + origin[axis].abs()) * reciprocal[axis].abs()
+        });
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
         let unscale = [direction_scale, lift / scale];
-        let scaled = |t: f32| {
-            if unscale == [1.0, scale.recip()] {
-                // What the divisions give, as powers of two have exact reciprocals, but sooner.
-                t * scale
-            } else {
-                t / unscale[1] / unscale[0]
-            }
-        };
+        let scaled = |t: f32| t / unscale[1] / unscale[0];
         Some(Self {
             origin: origin.to_array(),
             direction: direction.to_array(),
-            reciprocal: reciprocal.to_array(),
-            margin: margin.to_array(),
+            reciprocal,
+            margin,
             t_min: scaled(t_min),
             t_max: scaled(ray.t_max),
-            octant: reciprocal.is_negative_bitmask() as usize,
+            octant: (0..3)
+                .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
+                .sum(),
             unscale,
         })
     }
@@ -183,13 +180,19 @@ impl<L> BoxLanes<L> {
     where
         L: Lanes<N>,
     {
-        let offset = -Vec3A::from(ray.origin) * Vec3A::from(ray.reciprocal);
-        let pad = Vec3A::from(margin) * NODE_PAD;
+        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
+        for axis in 0..3 {
+            let offset = -ray.origin[axis] * ray.reciprocal[axis];
+            let pad = margin[axis] * NODE_PAD;
+            near_addend[axis] = offset - pad;
+            far_addend[axis] = offset + pad;
+            near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
+        }
         Self {
             reciprocal: splat_all(ray.reciprocal),
-            near_addend: splat_all((offset - pad).to_array()),
-            far_addend: splat_all((offset + pad).to_array()),
-            near_plane: [0, 1, 2].map(|axis| 2 * axis + (ray.octant >> axis & 1)),
+            near_addend: splat_all(near_addend),
+            far_addend: splat_all(far_addend),
+            near_plane,
             t_min: L::splat(ray.t_min),
         }
     }
@@ -212,9 +215,9 @@ impl<L> BoxLanes<L> {
             .mul_add(self.reciprocal[axis], self.far_addend[axis])
     }
 
-    /// Distances at which the boxes of a node are entered and left.
+    /// Distances at which the boxes of a node are entered, and one bit per box that is.
     #[inline(always)]
-    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, L)
+    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
     where
         L: Lanes<N>,
     {
@@ -222,12 +225,12 @@ impl<L> BoxLanes<L> {
         let enter = enter.max(self.near(node, 2).max(self.t_min));
         let leave = self.far(node, 0).min(self.far(node, 1));
         let leave = leave.min(self.far(node, 2).min(L::splat(t_max)));
-        (enter, leave)
+        (enter, L::bits(enter.le(leave)))
     }
 }
 
 /// Follows a reference down to a leaf, the first child in order before the others, which wait on
-/// the stack: by the order for an octant, or as they lie. `None` if the ray enters no further box.
+/// the stack. `None` if the ray enters no further box.
 ///
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
@@ -237,22 +240,16 @@ fn descend<const N: usize, const W: usize, B, L: Lanes<N>, C: Count>(
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
     t_max: f32,
-    octant: Option<usize>,
+    order: impl Fn(&Node<N, W>) -> u64,
     stack: &mut Stack<N>,
     count: &mut C,
 ) -> Option<ChildRef> {
     while !reference.is_leaf() {
         count.node();
         let node = &tree.nodes[reference.0 as usize];
-        let (enter, leave) = boxes.test(node, t_max);
-        let mask = L::bits(enter.le(leave));
+        let (enter, mask) = boxes.test(node, t_max);
         reference = if mask & mask.wrapping_sub(1) != 0 {
-            match octant {
-                Some(octant) => {
-                    enter.push_children(leave, &node.children, node.order(octant), stack);
-                }
-                None => enter.push_in_slot_order(leave, &node.children, stack),
-            }
+            enter.push_children(mask, &node.children, order(node), stack);
             ChildRef(stack.pop()?.0)
         } else if mask != 0 {
             ChildRef(node.children[mask.trailing_zeros() as usize & (N - 1)])
@@ -297,12 +294,13 @@ pub(crate) fn closest<
         if distance > best.t {
             continue;
         }
+        let order = |node: &Node<N, W>| node.order(ray.octant);
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             best.t,
-            Some(ray.octant),
+            order,
             &mut stack,
             count,
         ) else {
@@ -391,12 +389,13 @@ pub(crate) fn any<
         ray.t_min,
     );
     while let Some((reference, _)) = stack.pop() {
+        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             ray.t_max,
-            None,
+            order,
             &mut stack,
             count,
         ) else {
@@ -435,12 +434,13 @@ pub(crate) fn all<
         ray.t_min,
     );
     while let Some((reference, _)) = stack.pop() {
+        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
         let Some(leaf) = descend(
             tree,
             &boxes,
             ChildRef(reference),
             ray.t_max,
-            None,
+            order,
             &mut stack,
             &mut (),
         ) else {

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Aabb, Accuracy,
     boxes::{self, BoxHit},
-    bvh::{bounds_of, first_ids, hit_of, scale_of},
+    bvh::{bounds_of, hit_of, number_triangles, scale_of, triangle_count},
     error::BuildError,
     mesh::TriangleMesh,
     ray::{Hit, Ray},
@@ -30,7 +30,9 @@ pub fn closest_hit(
         Accuracy::Fast => fast_triangle,
         Accuracy::Robust => robust_triangle,
     };
-    let first_ids = first_ids(meshes)?;
+    triangle_count(meshes)?;
+    let mut first_ids = Vec::new();
+    number_triangles(meshes, &mut first_ids);
     let scale = scale_of(&bounds_of(meshes))?;
     let Some(setup) = RaySetup::new(ray, scale) else {
         return Ok(None);

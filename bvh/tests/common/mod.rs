@@ -38,6 +38,20 @@ pub(crate) fn built_qualities() -> Vec<Quality> {
     built.iter().map(quality).collect()
 }
 
+/// These, and those of Morton order once more with as many rotations as there may be.
+pub(crate) fn and_rotated(mut all: Vec<BuildParams>) -> Vec<BuildParams> {
+    let morton = all.iter().filter(|p| p.quality == Quality::Morton);
+    let rotated: Vec<_> = morton
+        .map(|&params| {
+            let mut params = params;
+            params.rotations = 16;
+            params
+        })
+        .collect();
+    all.extend(rotated);
+    all
+}
+
 /// Random numbers by SplitMix64 (Steele, Lea, Flood, *Fast Splittable Pseudorandom Number
 /// Generators*, 2014).
 pub(crate) struct Random(pub(crate) u64);

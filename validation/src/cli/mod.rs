@@ -1,6 +1,7 @@
 //! Subcommands, one file each.
 
 mod random;
+mod rebuilds;
 mod table;
 mod trees;
 
@@ -9,7 +10,9 @@ use clap::{Parser, Subcommand};
 /// Compares raywright with oracles.
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100)]
-#[command(after_help = "Exit codes: 0 all equal, 1 something differs, 2 bad input or usage.")]
+#[command(
+    after_help = "Exit codes: 0 all equal, 1 something differs or grows, 2 bad input or usage."
+)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -19,9 +22,11 @@ pub(crate) struct Cli {
 enum Command {
     /// Compare our trees with those of Embree's rtcBuildBVH, to the last bit
     Trees(trees::TreesArgs),
+    /// Build a scene again and again, and see whether memory grows
+    Rebuilds(rebuilds::RebuildsArgs),
 }
 
-/// What a comparison found.
+/// What a comparison found. Memory that grows is a difference too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Verdict {
     AllEqual,
@@ -32,5 +37,6 @@ pub(crate) enum Verdict {
 pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
     match cli.command {
         Command::Trees(args) => trees::run(&args),
+        Command::Rebuilds(args) => rebuilds::run(&args),
     }
 }

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &TreesArgs) -> Result<Verdict, Box<dyn Error>> {
 
 /// Beside the workspace: Cargo names this crate's folder to programs that it runs; otherwise the
 /// current folder is taken for the workspace.
-fn default_data() -> PathBuf {
+pub(super) fn default_data() -> PathBuf {
     let workspace = env::var_os("CARGO_MANIFEST_DIR")
         .map(PathBuf::from)
         .and_then(|member| member.parent().map(Path::to_path_buf))

@@ -121,10 +121,11 @@ pub struct BuildArguments {
 
 impl BuildArguments {
     /// The arguments for our parameters and `n` primitives; `None` for a quality that Embree does
-    /// not have.
+    /// not have, and for rotations, which it has in its own scenes alone.
     #[must_use]
     pub fn of(params: &BuildParams, n: usize) -> Option<Self> {
         let quality = match params.quality {
+            Quality::Morton if params.rotations > 0 => return None,
             Quality::Morton => BuildQuality::Low,
             Quality::BinnedSah => BuildQuality::Medium,
             Quality::SpatialSplits => BuildQuality::High,
