@@ -27,7 +27,8 @@ mod mesh;
 mod params;
 mod ray;
 #[allow(unsafe_code)]
-mod simd;
+#[doc(hidden)]
+pub mod simd;
 mod stats;
 mod traverse;
 

@@ -211,6 +211,19 @@ impl Projection {
         self.origin
     }
 
+    /// What [`Projection::direction`] adds up before it is made a unit: the direction to the centre
+    /// of the picture, and the steps for one pixel to the right and downwards.
+    #[inline]
+    pub fn frame(&self) -> [Vec3; 3] {
+        [self.forward, self.right_per_pixel, self.down_per_pixel]
+    }
+
+    /// Picture coordinates of the point looked at.
+    #[inline]
+    pub fn centre(&self) -> [f32; 2] {
+        [self.centre_x, self.centre_y]
+    }
+
     /// Unit direction of the ray through the picture point (`px`, `py`), pixels, (0, 0) being the
     /// top left corner of the picture and (0.5, 0.5) the centre of its first pixel.
     #[inline]

@@ -12,6 +12,21 @@
 
 use glam::Vec3;
 
+/// Items behind the last voxel: words of four bytes are read where two voxels are wanted.
+pub(crate) const PADDING: usize = 3;
+
+/// The type of raw values in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum VoxelType {
+    /// 8 bits without sign.
+    U8,
+    /// 16 bits without sign.
+    U16,
+    /// Floating point.
+    F32,
+}
+
 /// Raw values, x fastest, then y, then z.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -51,6 +66,14 @@ impl Voxels {
             Self::U8(values) => values[index].into(),
             Self::U16(values) => values[index].into(),
             Self::F32(values) => values[index],
+        }
+    }
+
+    fn pad(&mut self) {
+        match self {
+            Self::U8(values) => values.extend([0; PADDING]),
+            Self::U16(values) => values.extend([0; PADDING]),
+            Self::F32(values) => values.extend([0.0; PADDING]),
         }
     }
 
@@ -192,6 +215,7 @@ impl Volume {
             [missing, clamped] = make_finite(values);
         }
         let raw_range = voxels.range().unwrap_or([0.0; 2]);
+        voxels.pad();
         Ok(Self {
             dims,
             spacing,
@@ -239,10 +263,36 @@ impl Volume {
         }))
     }
 
-    /// The raw values, x fastest.
+    /// The raw value of a voxel by its place, x fastest.
+    ///
+    /// # Panics
+    /// If there is no such place.
     #[must_use]
-    pub fn voxels(&self) -> &Voxels {
+    pub fn raw(&self, index: usize) -> f32 {
+        assert!(index < self.len(), "no such voxel");
+        self.voxels.get(index)
+    }
+
+    /// How many voxels there are; at least one.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "there is always one")]
+    pub fn len(&self) -> usize {
+        self.voxels.len() - PADDING
+    }
+
+    /// The raw values, x fastest, and [`PADDING`] more, so that whoever reads a voxel may read on.
+    pub(crate) fn padded(&self) -> &Voxels {
         &self.voxels
+    }
+
+    /// The type of the raw values.
+    #[must_use]
+    pub fn voxel_type(&self) -> VoxelType {
+        match self.voxels {
+            Voxels::U8(_) => VoxelType::U8,
+            Voxels::U16(_) => VoxelType::U16,
+            Voxels::F32(_) => VoxelType::F32,
+        }
     }
 
     /// How raw values become values.
@@ -284,7 +334,7 @@ impl Volume {
     pub fn value(&self, [x, y, z]: [usize; 3]) -> f32 {
         let [width, height, depth] = self.dims;
         assert!(x < width && y < height && z < depth, "no such voxel");
-        self.value_of(self.voxels.get((z * height + y) * width + x))
+        self.value_of(self.raw((z * height + y) * width + x))
     }
 
     /// How many voxels have no value.

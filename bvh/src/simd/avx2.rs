@@ -18,7 +18,7 @@ use std::arch::x86_64::{
 };
 
 use super::{
-    Lanes,
+    Lanes, PushChildren,
     portable::{Half, Halves},
     stack::Stack,
 };
@@ -37,7 +37,7 @@ pub(crate) struct Mask4(__m128);
 
 /// The result of a comparison of eight lanes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mask8(__m256);
+pub(crate) struct Mask8(pub(super) __m256);
 
 /// Also for `avx512`, with the argument of its header in place of this one's.
 macro_rules! lanes_by_intrinsics {
@@ -136,6 +136,9 @@ macro_rules! lanes_by_intrinsics {
                 // SAFETY: as `add`.
                 (unsafe { $movemask(mask.0) }) as u32
             }
+        }
+
+        impl PushChildren<$n> for $lanes {
             $($push)?
         }
     };

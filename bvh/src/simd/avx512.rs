@@ -26,7 +26,7 @@ use std::arch::x86_64::{
     _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_xor_ps,
 };
 
-use super::{Lanes, avx2::lanes_by_intrinsics, stack::Stack};
+use super::{Lanes, PushChildren, avx2::lanes_by_intrinsics, stack::Stack};
 
 /// Four lanes in a register of 128 bits.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ pub(crate) struct F32x8(__m256);
 
 /// Sixteen lanes in a register of 512 bits.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct F32x16(__m512);
+pub(crate) struct F32x16(pub(super) __m512);
 
 /// The result of a comparison of four lanes.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +50,7 @@ pub(crate) struct Mask8(__m256);
 
 /// The result of a comparison of sixteen lanes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mask16(__mmask16);
+pub(crate) struct Mask16(pub(super) __mmask16);
 
 lanes_by_intrinsics!(
     F32x4,

@@ -5,7 +5,7 @@
 use wide::{f32x4, f32x8};
 
 use super::{
-    Isa, Lanes,
+    Isa, PushChildren,
     portable::{Halves, Pair},
 };
 #[cfg(target_arch = "x86_64")]
@@ -21,13 +21,13 @@ use crate::{
 /// The lane types that serve nodes of `N` children under each instruction set.
 pub(crate) trait Width<const N: usize> {
     /// Portable lanes.
-    type Portable: Lanes<N>;
+    type Portable: PushChildren<N>;
     /// AVX2 lanes.
     #[cfg(target_arch = "x86_64")]
-    type Avx2: Lanes<N>;
+    type Avx2: PushChildren<N>;
     /// AVX-512 lanes.
     #[cfg(target_arch = "x86_64")]
-    type Avx512: Lanes<N>;
+    type Avx512: PushChildren<N>;
 }
 
 /// Names the widths that have kernels.

@@ -15,14 +15,16 @@ pub(crate) mod avx2;
 pub(crate) mod avx512;
 pub(crate) mod build;
 pub(crate) mod dispatch;
+pub(crate) mod gather;
 pub(crate) mod isa;
 pub(crate) mod portable;
 pub(crate) mod stack;
 
+pub use gather::{GatherLanes, LaneKernel, run};
 pub use isa::Isa;
 
 /// `N` lanes of `f32`.
-pub(crate) trait Lanes<const N: usize>: Copy {
+pub trait Lanes<const N: usize>: Copy {
     /// One bit per lane, before it is read out.
     type Mask: Copy + std::ops::BitAnd<Output = Self::Mask>;
 
@@ -56,7 +58,10 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn is_nonzero(self) -> Self::Mask;
     /// Bit i of the result is lane i.
     fn bits(mask: Self::Mask) -> u32;
+}
 
+/// Lanes that hold what a ray finds at the children of a node.
+pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
     /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
     /// `self`, in the order of the child numbers that `order` holds in fields of
     /// `log2(N)` bits, lowest field first.
@@ -79,7 +84,7 @@ pub(crate) trait Lanes<const N: usize>: Copy {
 
 /// Each of three values in every lane.
 #[inline(always)]
-pub(crate) fn splat_all<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
+pub fn splat_all<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
     [L::splat(x), L::splat(y), L::splat(z)]
 }
 

@@ -2,7 +2,7 @@
 
 use wide::{f32x4, f32x8};
 
-use super::{Lanes, stack::Stack};
+use super::{Lanes, PushChildren, stack::Stack};
 
 macro_rules! lanes_by_wide {
     ($wide:ty, $n:literal) => {
@@ -70,6 +70,8 @@ macro_rules! lanes_by_wide {
                 mask.to_bitmask()
             }
         }
+
+        impl PushChildren<$n> for $wide {}
     };
 }
 
@@ -146,12 +148,14 @@ impl<L: Lanes<4>> Lanes<2> for Pair<L> {
     }
 }
 
+impl<L: Lanes<4>> PushChildren<2> for Pair<L> {}
+
 /// Sixteen lanes in two halves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Halves<L>(pub L, pub L);
 
 /// Eight lanes that can be half of sixteen.
-pub(crate) trait Half: Lanes<8> {
+pub(crate) trait Half: PushChildren<8> {
     /// [`Lanes::push_children`] of both halves.
     #[inline(always)]
     fn push_children_of_both(
@@ -251,6 +255,9 @@ impl<L: Half> Lanes<16> for Halves<L> {
     fn bits(mask: Self::Mask) -> u32 {
         L::bits(mask.0) | L::bits(mask.1) << 8
     }
+}
+
+impl<L: Half> PushChildren<16> for Halves<L> {
     #[inline(always)]
     fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
         L::push_children_of_both(self, mask, children, order, stack);

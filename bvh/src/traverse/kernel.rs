@@ -23,7 +23,7 @@ use crate::{
         tree::Tree,
     },
     ray::{Ray, Work},
-    simd::{Lanes, splat_all, stack::Stack},
+    simd::{Lanes, PushChildren, splat_all, stack::Stack},
 };
 
 /// Bound S of the magnitude of scaled coordinates.
@@ -235,7 +235,7 @@ impl<L> BoxLanes<L> {
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
 #[inline(always)]
-fn descend<const N: usize, const W: usize, B, L: Lanes<N>, C: Count>(
+fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, C: Count>(
     tree: &Tree<N, W, B>,
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
@@ -267,7 +267,7 @@ pub(crate) fn closest<
     const W: usize,
     B: Block,
     A: TriangleTest<B>,
-    L: Lanes<N>,
+    L: PushChildren<N>,
     T: Lanes<4>,
     C: Count,
 >(
@@ -372,7 +372,7 @@ pub(crate) fn any<
     const W: usize,
     B: Block,
     A: TriangleTest<B>,
-    L: Lanes<N>,
+    L: PushChildren<N>,
     T: Lanes<4>,
     C: Count,
 >(
@@ -418,7 +418,7 @@ pub(crate) fn all<
     const W: usize,
     B: Block,
     A: TriangleTest<B>,
-    L: Lanes<N>,
+    L: PushChildren<N>,
     T: Lanes<4>,
 >(
     tree: &Tree<N, W, B>,

@@ -1,0 +1,311 @@
+//! Ray casting: pictures of volumes.
+
+mod kernel;
+mod reference;
+mod view;
+
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+use raywright_bvh::Isa;
+use raywright_imaging::{Camera, CameraError, Image};
+
+use crate::{
+    blocks::Blocks,
+    distance::distances,
+    grid::{Volume, Voxels},
+    table::{DEFAULT_SIZE, TransferTable},
+    transfer::TransferFunction,
+};
+use kernel::TileKernel;
+use reference::RayResult;
+use view::View;
+
+/// Side of a tile, pixels.
+const TILE_SIZE: u32 = 32;
+
+/// Binary logarithm of the cells along the edge of a block, if nobody wishes otherwise.
+const BLOCK_SHIFT: u32 = 3;
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct CastOptions {
+    /// Distance between samples, in lengths of a voxel (the smallest spacing); above 0.
+    pub step: f32,
+    /// A ray ends when its opacity is above this; 1 or more: never.
+    pub termination: f32,
+    /// How empty space is left out. Changes no pixel.
+    pub skipping: Skipping,
+    /// The instruction set. Changes no pixel.
+    pub isa: Isa,
+}
+
+impl Default for CastOptions {
+    fn default() -> Self {
+        Self {
+            step: 1.0,
+            termination: 0.98,
+            skipping: Skipping::Distance,
+            isa: Isa::best(),
+        }
+    }
+}
+
+/// How empty space is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Skipping {
+    /// Not at all.
+    None,
+    /// By the distance to the next block in which something can be seen.
+    Distance,
+}
+
+/// Why there is no picture.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CastError {
+    /// The camera or the size of the picture.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The step is not a positive number.
+    #[error("a step of {step} voxels: it must be above 0 and finite")]
+    Step {
+        /// The step.
+        step: f32,
+    },
+    /// The threshold is not a number.
+    #[error("a termination threshold of {termination}: it must be a number from 0 on")]
+    Termination {
+        /// The threshold.
+        termination: f32,
+    },
+    /// The volume has more voxels than lanes can index.
+    #[error("{voxels} voxels are more than the {limit} that can be indexed")]
+    TooLarge {
+        /// How many there are.
+        voxels: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+}
+
+/// What a picture took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Work {
+    /// Rays that meet the box of the volume.
+    pub rays: u64,
+    /// Samples that were interpolated.
+    pub samples: u64,
+    /// Samples of which something is seen.
+    pub lit_samples: u64,
+    /// Jumps over empty space.
+    pub skips: u64,
+}
+
+impl Work {
+    fn add(&mut self, other: &Self) {
+        self.rays += other.rays;
+        self.samples += other.samples;
+        self.lit_samples += other.lit_samples;
+        self.skips += other.skips;
+    }
+}
+
+/// A picture of a volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Linear RGB over black.
+    pub image: Image,
+    /// Opacity of each pixel, row by row.
+    pub opacity: Vec<f32>,
+    /// For each pixel, the number of the sample behind the last one that was looked at, as the
+    /// distance from the eye in steps; 0 where the ray has none.
+    pub end: Vec<f32>,
+    /// What it took.
+    pub work: Work,
+}
+
+/// Distances in blocks.
+#[derive(Clone, Debug)]
+struct DistanceMap {
+    distances: Vec<u8>,
+    dims: [usize; 3],
+    shift: u32,
+}
+
+/// What all rays of a picture read.
+struct Frame<'a> {
+    volume: &'a Volume,
+    view: View,
+    table: &'a TransferTable,
+    termination: f32,
+    distances: Option<&'a DistanceMap>,
+}
+
+/// Casts rays through a volume, from any camera with any transfer function.
+#[derive(Clone, Debug)]
+pub struct Raycaster<'a> {
+    volume: &'a Volume,
+    blocks: Blocks,
+}
+
+impl<'a> Raycaster<'a> {
+    /// Prepares a volume: finds the bounds of its blocks.
+    ///
+    /// # Errors
+    /// [`CastError::TooLarge`].
+    pub fn new(volume: &'a Volume) -> Result<Self, CastError> {
+        let limit = i32::MAX as usize - 8;
+        if volume.len() > limit {
+            return Err(CastError::TooLarge {
+                voxels: volume.len(),
+                limit,
+            });
+        }
+        Ok(Self {
+            volume,
+            blocks: Blocks::new(volume, BLOCK_SHIFT),
+        })
+    }
+
+    /// A picture of `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// [`CastError`] if the camera, the size or an option has no meaning.
+    pub fn render(
+        &self,
+        function: &TransferFunction,
+        camera: &Camera,
+        [width, height]: [u32; 2],
+        options: &CastOptions,
+    ) -> Result<Picture, CastError> {
+        if !(options.step > 0.0 && options.step.is_finite()) {
+            return Err(CastError::Step { step: options.step });
+        }
+        if !(options.termination >= 0.0) {
+            return Err(CastError::Termination {
+                termination: options.termination,
+            });
+        }
+        let projection = camera.projection(width, height)?;
+        let mut image =
+            Image::new(width, height).map_err(|_| CameraError::EmptyPicture { width, height })?;
+        let table = TransferTable::new(function, self.volume, options.step, DEFAULT_SIZE);
+        let map = match options.skipping {
+            Skipping::None => None,
+            Skipping::Distance => Some(self.distance_map(&table)),
+        };
+        let frame = Frame {
+            volume: self.volume,
+            view: View::new(
+                self.volume,
+                &projection,
+                options.step * self.volume.unit_length(),
+            ),
+            table: &table,
+            termination: options.termination,
+            distances: map.as_ref(),
+        };
+        let (results, work) = cast_tiles(&frame, [width, height], options.isa);
+        for (pixel, result) in image.pixels_mut().iter_mut().zip(&results) {
+            *pixel = result.colour;
+        }
+        Ok(Picture {
+            image,
+            opacity: results.iter().map(|r| r.opacity).collect(),
+            end: results.iter().map(|r| r.end).collect(),
+            work,
+        })
+    }
+
+    fn distance_map(&self, table: &TransferTable) -> DistanceMap {
+        let dims = self.blocks.dims;
+        let mut distances = distances(&self.blocks.lit(table), dims);
+        // Words of four bytes are read.
+        distances.extend([0; 3]);
+        DistanceMap {
+            distances,
+            dims,
+            shift: self.blocks.shift,
+        }
+    }
+}
+
+/// The results of all pixels, tile by tile in parallel.
+fn cast_tiles(frame: &Frame<'_>, [width, height]: [u32; 2], isa: Isa) -> (Vec<RayResult>, Work) {
+    let nothing = RayResult {
+        colour: [0.0; 3],
+        opacity: 0.0,
+        end: 0.0,
+    };
+    let mut results = vec![nothing; width as usize * height as usize];
+    let total = Mutex::new(Work::default());
+    let band = TILE_SIZE as usize * width as usize;
+    results
+        .par_chunks_mut(band)
+        .enumerate()
+        .for_each(|(band, rows)| {
+            let top = band as u32 * TILE_SIZE;
+            let bottom = (top + TILE_SIZE).min(height);
+            let mut work = Work::default();
+            let mut tile = Vec::new();
+            for left in (0..width).step_by(TILE_SIZE as usize) {
+                let columns = left..(left + TILE_SIZE).min(width);
+                tile.clear();
+                tile.resize(columns.len() * (bottom - top) as usize, nothing);
+                cast_tile(
+                    frame,
+                    isa,
+                    columns.clone(),
+                    top..bottom,
+                    &mut tile,
+                    &mut work,
+                );
+                let rows = rows.chunks_exact_mut(width as usize);
+                for (row, own) in rows.zip(tile.chunks_exact(columns.len())) {
+                    row[columns.start as usize..columns.end as usize].copy_from_slice(own);
+                }
+            }
+            total.lock().unwrap_or_else(|e| e.into_inner()).add(&work);
+        });
+    (
+        results,
+        total.into_inner().unwrap_or_else(|e| e.into_inner()),
+    )
+}
+
+fn cast_tile(
+    frame: &Frame<'_>,
+    isa: Isa,
+    columns: std::ops::Range<u32>,
+    rows: std::ops::Range<u32>,
+    results: &mut [RayResult],
+    work: &mut Work,
+) {
+    macro_rules! run {
+        ($voxels:expr) => {
+            raywright_bvh::simd::run(
+                isa,
+                TileKernel {
+                    frame,
+                    voxels: $voxels,
+                    columns,
+                    rows,
+                    results,
+                    work,
+                },
+            )
+        };
+    }
+    match frame.volume.padded() {
+        Voxels::U8(voxels) => run!(voxels),
+        Voxels::U16(voxels) => run!(voxels),
+        Voxels::F32(voxels) => run!(voxels),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,251 @@
+//! Kernels against the slow twin.
+
+use glam::Vec3;
+use proptest::prelude::*;
+
+use super::*;
+use crate::{grid::ValueScale, transfer::ControlPoint};
+
+fn function(points: &[[f32; 5]]) -> TransferFunction {
+    let points: Vec<ControlPoint> = points.iter().map(|&p| p.into()).collect();
+    TransferFunction::new(points).unwrap()
+}
+
+/// A blob in the middle of little, and specks.
+fn values(dims: [usize; 3], seed: u32) -> Vec<f32> {
+    let mut values = Vec::new();
+    let mut state = seed | 1;
+    for z in 0..dims[2] {
+        for y in 0..dims[1] {
+            for x in 0..dims[0] {
+                let at = |i: usize, axis: usize| (i as f32 + 0.5) / dims[axis] as f32 - 0.5;
+                let r = Vec3::new(at(x, 0), at(y, 1), at(z, 2)).length();
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (state >> 24) as f32 / 40.0;
+                let speck = if state >> 16 & 0xfff == 7 { 200.0 } else { 0.0 };
+                values.push(
+                    (255.0 * (1.0 - 3.0 * r) + noise + speck)
+                        .clamp(0.0, 255.0)
+                        .round(),
+                );
+            }
+        }
+    }
+    values
+}
+
+fn volumes(dims: [usize; 3], spacing: [f32; 3], seed: u32) -> Vec<Volume> {
+    let values = values(dims, seed);
+    let new = |voxels, slope| {
+        let scale = ValueScale {
+            slope,
+            intercept: 3.0,
+        };
+        Volume::new(dims, spacing, voxels, scale).unwrap()
+    };
+    let mut missing = values.clone();
+    for (i, value) in missing.iter_mut().enumerate() {
+        if i % 97 == 5 {
+            *value = f32::NAN;
+        }
+    }
+    vec![
+        new(Voxels::U8(values.iter().map(|&v| v as u8).collect()), 1.0),
+        new(
+            Voxels::U16(values.iter().map(|&v| v as u16 * 257).collect()),
+            -0.01,
+        ),
+        new(Voxels::F32(values), 0.5),
+        new(Voxels::F32(missing), 0.5),
+    ]
+}
+
+fn functions(volume: &Volume) -> [TransferFunction; 3] {
+    let [low, high] = volume.range();
+    let at = |share: f32| low + (high - low) * share;
+    [
+        function(&[
+            [at(0.0), 0.2, 0.3, 0.4, 0.0],
+            [at(0.5), 0.9, 0.3, 0.4, 0.0],
+            [at(1.0), 1.0, 1.0, 0.9, 0.9],
+        ]),
+        function(&[
+            [at(0.1), 0.2, 0.3, 0.4, 0.01],
+            [at(0.9), 1.0, 0.1, 0.2, 0.2],
+        ]),
+        // A narrow band.
+        function(&[
+            [at(0.41), 0.0, 0.0, 0.0, 0.0],
+            [at(0.41), 1.0, 0.8, 0.1, 1.0],
+            [at(0.42), 1.0, 0.8, 0.1, 1.0],
+            [at(0.42), 0.0, 0.0, 0.0, 0.0],
+        ]),
+    ]
+}
+
+fn reference_picture(
+    caster: &Raycaster<'_>,
+    function: &TransferFunction,
+    camera: &Camera,
+    size: [u32; 2],
+    options: &CastOptions,
+) -> Vec<RayResult> {
+    let table = TransferTable::new(function, caster.volume, options.step, DEFAULT_SIZE);
+    let projection = camera.projection(size[0], size[1]).unwrap();
+    let frame = Frame {
+        volume: caster.volume,
+        view: View::new(
+            caster.volume,
+            &projection,
+            options.step * caster.volume.unit_length(),
+        ),
+        table: &table,
+        termination: options.termination,
+        distances: None,
+    };
+    (0..size[1])
+        .flat_map(|y| (0..size[0]).map(move |x| (x, y)))
+        .map(|(x, y)| reference::cast(&frame, x, y))
+        .collect()
+}
+
+fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
+    let caster = Raycaster::new(volume).unwrap();
+    for function in functions(volume) {
+        let options = CastOptions {
+            step,
+            ..CastOptions::default()
+        };
+        let expected = reference_picture(&caster, &function, camera, size, &options);
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for skipping in [Skipping::None, Skipping::Distance] {
+                let options = CastOptions {
+                    isa,
+                    skipping,
+                    ..options
+                };
+                let picture = caster.render(&function, camera, size, &options).unwrap();
+                for (i, expected) in expected.iter().enumerate() {
+                    let got = (picture.image.pixels()[i], picture.opacity[i]);
+                    assert_eq!(
+                        got,
+                        (expected.colour, expected.opacity),
+                        "pixel {i}, {isa}, {skipping:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kernel_gives_the_bits_of_the_slow_twin() {
+    let mut lit = 0;
+    for (dims, spacing) in [
+        ([20, 17, 31], [1.0, 1.5, 0.7]),
+        ([1, 9, 8], [1.0; 3]),
+        ([9, 1, 12], [1.0; 3]),
+        ([3, 40, 1], [0.5, 1.0, 2.0]),
+        ([1, 1, 1], [1.0; 3]),
+    ] {
+        for volume in volumes(dims, spacing, 3) {
+            let extent = volume.extent();
+            let outside = extent * 0.5 + Vec3::new(1.3, -1.9, 1.1) * (extent.length() + 1.0) * 0.6;
+            for origin in [outside, extent * 0.45 + 0.01] {
+                let camera = Camera::new(origin, extent * 0.51, Vec3::Z, 45.0).unwrap();
+                check(&volume, &camera, [45, 38], 0.8);
+                lit += 1;
+            }
+        }
+    }
+    assert_eq!(lit, 40);
+}
+
+#[test]
+fn rays_along_axes_and_through_faces() {
+    let volume = &volumes([12, 12, 12], [1.0; 3], 9)[0];
+    let (middle, far) = (Vec3::splat(5.5), 30.0);
+    for direction in [
+        Vec3::X,
+        Vec3::NEG_X,
+        Vec3::Y,
+        Vec3::NEG_Y,
+        Vec3::Z,
+        Vec3::NEG_Z,
+    ] {
+        let up = if direction.z == 0.0 { Vec3::Z } else { Vec3::X };
+        // Odd sizes have a pixel in the middle that looks exactly along the axis.
+        for centre in [
+            middle,
+            Vec3::ZERO,
+            Vec3::splat(11.0),
+            Vec3::new(5.0, 11.0, 0.0),
+        ] {
+            let camera = Camera::new(centre - direction * far, centre, up, 20.0).unwrap();
+            check(volume, &camera, [9, 7], 1.0);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn any_view_of_any_volume(
+        dims in prop::array::uniform3(1usize..24),
+        spacing in prop::array::uniform3(0.2f32..3.0),
+        origin in prop::array::uniform3(-1.5f32..2.5),
+        target in prop::array::uniform3(0.0f32..1.0),
+        fov in 5.0f32..120.0,
+        step in 0.2f32..3.0,
+        seed in 0u32..1000,
+        which in 0usize..4,
+    ) {
+        let volume = &volumes(dims, spacing, seed)[which];
+        let extent = volume.extent().max(Vec3::splat(0.5));
+        let camera = Camera::new(Vec3::from(origin) * extent, Vec3::from(target) * extent, Vec3::new(0.1, 0.2, 1.0), fov);
+        if let Ok(camera) = camera {
+            check(volume, &camera, [23, 19], step);
+        }
+    }
+}
+
+#[test]
+fn a_constant_medium_is_as_opaque_as_its_length_says() {
+    let volume = Volume::new(
+        [33, 33, 33],
+        [1.0; 3],
+        Voxels::U8(vec![7; 33 * 33 * 33]),
+        ValueScale::default(),
+    )
+    .unwrap();
+    let caster = Raycaster::new(&volume).unwrap();
+    let function = function(&[[0.0, 0.5, 0.25, 1.0, 0.05]]);
+    let camera = Camera::new(
+        Vec3::new(16.0, 16.0, -40.0),
+        Vec3::splat(16.0),
+        Vec3::Y,
+        10.0,
+    )
+    .unwrap();
+    for step in [2.0, 1.0, 0.5, 0.25] {
+        let options = CastOptions {
+            step,
+            termination: 1.0,
+            ..CastOptions::default()
+        };
+        let picture = caster.render(&function, &camera, [1, 1], &options).unwrap();
+        // Samples at 40, 40 + step, … 72: one more than there are steps.
+        let expected = 1.0 - 0.95_f64.powf(f64::from(32.0 + step));
+        assert!(
+            (f64::from(picture.opacity[0]) - expected).abs() < 1e-5,
+            "{step}: {}",
+            picture.opacity[0]
+        );
+        let [r, g, b] = picture.image.pixels()[0].map(f64::from);
+        assert!(
+            (r - 0.5 * expected).abs() < 1e-5
+                && (g - 0.25 * expected).abs() < 1e-5
+                && (b - expected).abs() < 1e-5
+        );
+    }
+}

@@ -1,0 +1,57 @@
+//! What all rays of a picture share, in the space of voxels.
+//!
+//! Samples lie at t = k·Δ along a ray, k = 1, 2, …: one lattice that is anchored at the eye and not
+//! where a ray enters. So whatever is left out, by blocks, tiles or a clip box, moves no sample.
+//!
+//! Invariant: the position of sample k is `k · step + eye`, two roundings in f32, in every kernel.
+
+use raywright_imaging::Projection;
+
+use crate::grid::Volume;
+
+/// A pinhole camera over a volume, with the distance between samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    /// Where rays begin, in voxels.
+    pub(crate) eye: [f32; 3],
+    /// World directions: to the centre of the picture, and of one pixel to the right and down.
+    pub(crate) frame: [[f32; 3]; 3],
+    /// Picture coordinates of the centre.
+    pub(crate) centre: [f32; 2],
+    /// A unit of direction, times this, is a step in voxels.
+    pub(crate) scale: [f32; 3],
+    /// The box in which there are samples, in voxels.
+    pub(crate) low: [f32; 3],
+    pub(crate) high: [f32; 3],
+    /// The last voxel; samples beyond are moved onto it.
+    pub(crate) last_voxel: [f32; 3],
+}
+
+impl View {
+    /// Rays of `projection` with a sample every `step` world units.
+    pub(crate) fn new(volume: &Volume, projection: &Projection, step: f32) -> Self {
+        let (dims, spacing) = (volume.dims(), volume.spacing());
+        let origin = projection.origin().to_array();
+        let last_voxel = dims.map(|n| (n - 1) as f32);
+        // A single layer has the thickness of one voxel.
+        let is_thin = dims.map(|n| n == 1);
+        let per_axis = |value: fn(f32, f32) -> f32, of: [f32; 3]| {
+            std::array::from_fn(|axis| value(of[axis], spacing[axis]))
+        };
+        Self {
+            eye: per_axis(|o, s| (f64::from(o) / f64::from(s)) as f32, origin),
+            frame: projection.frame().map(|v| v.to_array()),
+            centre: projection.centre(),
+            scale: per_axis(|step, s| step / s, [step; 3]),
+            low: is_thin.map(|thin| if thin { -0.5 } else { 0.0 }),
+            high: std::array::from_fn(|axis| if is_thin[axis] { 0.5 } else { last_voxel[axis] }),
+            last_voxel,
+        }
+    }
+}
+
+/// Largest number of a sample: above, floats do not hold every integer.
+pub(crate) const LAST_SAMPLE: f32 = (1 << 24) as f32;
+
+/// Components of a step below this are taken for 0: their reciprocal might be infinite.
+pub(crate) const SMALLEST_STEP: f32 = 1e-30;

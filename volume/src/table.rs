@@ -1,0 +1,166 @@
+//! A transfer function baked for one volume and one step: colour and opacity by index, the opacity
+//! being that of a step.
+//!
+//! With α the opacity of one voxel's length and s the step in these lengths, a step has
+//! 1 − (1 − α)^s = −expm1(s · ln1p(−α)).
+//!
+//! Invariant: the index of a value, and so what it looks like, is one sequence of f32 operations,
+//! the same for a sample, for the bounds of a block and in every instruction set. So a block is
+//! empty only if no sample in it can be seen.
+
+use crate::{grid::Volume, transfer::TransferFunction};
+
+/// Entries of a table if nobody wishes otherwise. More than the values of 8 bits, since values
+/// between them occur too.
+pub(crate) const DEFAULT_SIZE: usize = 1024;
+
+/// Numbers of an entry: red, green, blue, opacity of a step.
+pub(crate) const ENTRY: usize = 4;
+
+/// A baked transfer function.
+#[derive(Clone, Debug)]
+pub(crate) struct TransferTable {
+    /// [`ENTRY`] numbers for each entry.
+    pub(crate) entries: Vec<f32>,
+    /// index = raw · scale + offset, limited and rounded.
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+    /// How many entries before each have an opacity above 0; one more than there are entries.
+    lit_before: Vec<u32>,
+}
+
+impl TransferTable {
+    /// The table of `size` ≥ 2 entries over the values of a volume, for steps of `step` > 0 lengths
+    /// of a voxel.
+    pub(crate) fn new(
+        function: &TransferFunction,
+        volume: &Volume,
+        step: f32,
+        size: usize,
+    ) -> Self {
+        let [low, high] = volume.raw_range();
+        let last = (size - 1) as f32;
+        let scale = if high > low { last / (high - low) } else { 0.0 };
+        let [low, high] = [low, high].map(f64::from);
+        let [slope, intercept] = [volume.scale().slope, volume.scale().intercept].map(f64::from);
+        let mut table = Self {
+            entries: Vec::with_capacity(size * ENTRY),
+            scale,
+            offset: -volume.raw_range()[0] * scale,
+            lit_before: Vec::with_capacity(size + 1),
+        };
+        let mut lit = 0;
+        for index in 0..size {
+            let raw = low + (high - low) * index as f64 / f64::from(last);
+            let [r, g, b, opacity] = function.at(raw * slope + intercept);
+            let of_step = -(f64::from(step) * (-opacity).ln_1p()).exp_m1();
+            table.entries.extend([r, g, b, of_step].map(|v| v as f32));
+            table.lit_before.push(lit);
+            lit += u32::from(table.opacity(index) > 0.0);
+        }
+        table.lit_before.push(lit);
+        table
+    }
+
+    /// How many entries there are.
+    pub(crate) fn len(&self) -> usize {
+        self.lit_before.len() - 1
+    }
+
+    /// The opacity of a step at an entry.
+    pub(crate) fn opacity(&self, index: usize) -> f32 {
+        self.entries[index * ENTRY + 3]
+    }
+
+    /// The entry of a raw value; NaN has the first.
+    pub(crate) fn index(&self, raw: f32) -> usize {
+        let place = raw * self.scale + self.offset;
+        // As lanes do it: NaN becomes the second operand.
+        let place = if place > 0.0 { place } else { 0.0 };
+        let last = (self.len() - 1) as f32;
+        let place = if place < last { place } else { last };
+        place.round_ties_even() as usize
+    }
+
+    /// Whether nothing can be seen of raw values from `low` to `high`, even if a value between
+    /// them is computed as one that is just outside.
+    pub(crate) fn is_transparent(&self, low: f32, high: f32) -> bool {
+        let first = self.index(low).saturating_sub(1);
+        let end = (self.index(high) + 2).min(self.len());
+        self.lit_before[first] == self.lit_before[end]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        grid::{ValueScale, Voxels},
+        transfer::ControlPoint,
+    };
+
+    fn volume(values: Vec<f32>) -> Volume {
+        let scale = ValueScale {
+            slope: 2.0,
+            intercept: -1.0,
+        };
+        Volume::new([values.len(), 1, 1], [1.0; 3], Voxels::F32(values), scale).unwrap()
+    }
+
+    fn function(points: &[[f32; 5]]) -> TransferFunction {
+        let points: Vec<ControlPoint> = points.iter().map(|&p| p.into()).collect();
+        TransferFunction::new(points).unwrap()
+    }
+
+    #[test]
+    fn opacity_of_a_step_compounds() {
+        let function = function(&[[0.0, 1.0, 0.5, 0.25, 0.3], [9.0, 0.0, 0.0, 0.0, 1.0]]);
+        for step in [0.125, 0.5, 1.0, 3.0] {
+            let table = TransferTable::new(&function, &volume(vec![0.5, 5.0]), step, 256);
+            let expected = 1.0 - 0.7_f64.powf(f64::from(step));
+            assert!((f64::from(table.opacity(0)) - expected).abs() < 1e-7);
+            assert_eq!(table.opacity(255), 1.0, "opaque stays opaque");
+            assert_eq!(table.entries[..3], [1.0, 0.5, 0.25]);
+        }
+    }
+
+    #[test]
+    fn tiny_opacities_keep_their_digits() {
+        let function = function(&[[0.0, 1.0, 1.0, 1.0, 1e-7]]);
+        let table = TransferTable::new(&function, &volume(vec![0.0, 1.0]), 0.25, 16);
+        assert!(
+            (table.opacity(3) / 2.5e-8 - 1.0).abs() < 1e-5,
+            "{}",
+            table.opacity(3)
+        );
+    }
+
+    #[test]
+    fn transparent_is_what_no_entry_near_shows() {
+        // Opaque in 4.0..4.1 (raw 2.5..2.55) alone.
+        let points = [
+            [4.0, 0.0, 0.0, 0.0, 0.0],
+            [4.0, 1.0, 1.0, 1.0, 1.0],
+            [4.1, 1.0, 1.0, 1.0, 1.0],
+            [4.1, 0.0, 0.0, 0.0, 0.0],
+        ];
+        let table = TransferTable::new(&function(&points), &volume(vec![0.0, 10.0]), 1.0, 1024);
+        assert!(table.is_transparent(0.0, 2.48));
+        assert!(
+            !table.is_transparent(0.0, 10.0),
+            "a value that no voxel has"
+        );
+        assert!(!table.is_transparent(2.0, 2.52));
+        assert!(table.is_transparent(2.58, 10.0));
+    }
+
+    #[test]
+    fn a_constant_volume_has_the_first_entry() {
+        let table = TransferTable::new(&function(&[[0.0; 5]]), &volume(vec![3.0, 3.0]), 1.0, 8);
+        assert_eq!(
+            [3.0, 0.0, 9.0, f32::NAN].map(|raw| table.index(raw)),
+            [0; 4]
+        );
+        assert!(table.is_transparent(3.0, 3.0));
+    }
+}
