@@ -5,9 +5,11 @@
 #![deny(unsafe_code)]
 
 pub mod grid;
+pub mod load;
 pub mod transfer;
 
 pub use crate::{
     grid::{GridError, Orientation, ValueScale, Volume, Voxels},
+    load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},
     transfer::{ControlPoint, TransferError, TransferFunction},
 };
