@@ -4,12 +4,20 @@
 //! like any other) and on `raywright-imaging`, and knows nothing of the path tracer.
 #![deny(unsafe_code)]
 
+pub mod generate;
 pub mod grid;
 pub mod load;
+pub mod presets;
+pub mod statistics;
 pub mod transfer;
+pub mod view;
+mod voxels;
 
 pub use crate::{
+    generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},
+    statistics::Statistics,
     transfer::{ControlPoint, TransferError, TransferFunction},
+    view::View,
 };
