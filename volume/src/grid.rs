@@ -76,13 +76,13 @@ pub enum GridError {
         spacing: [f32; 3],
     },
     /// The slope is 0, or slope or intercept is not finite.
-    #[error("slope {} and intercept {}: both must be finite, and the slope not 0", scale.slope, scale.intercept)]
+    #[error("slope {:?} and intercept {:?}: both must be finite, and the slope not 0", scale.slope, scale.intercept)]
     ValueScale {
         /// What was given.
         scale: ValueScale,
     },
     /// Slope and intercept lead out of single precision.
-    #[error("values from {} to {}: they must be finite", range[0], range[1])]
+    #[error("values from {:?} to {:?}: they must be finite", range[0], range[1])]
     ValueRange {
         /// The smallest and the largest value.
         range: [f32; 2],

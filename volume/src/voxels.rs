@@ -45,7 +45,11 @@ impl Voxels {
     /// The smallest and largest value that is not NaN; `None` if there is none.
     pub(crate) fn range(&self) -> Option<[f32; 2]> {
         fn of<T: Copy + PartialOrd>(values: &[T]) -> Option<[T; 2]> {
-            let mut finite = values.iter().copied().filter(|v| *v == *v);
+            // Only NaN cannot be compared with itself.
+            let mut finite = values
+                .iter()
+                .copied()
+                .filter(|v| v.partial_cmp(v).is_some());
             let first = finite.next()?;
             Some(finite.fold([first; 2], |[low, high], v| {
                 [

@@ -208,6 +208,11 @@ impl Read for Members<'_> {
                         self.garbage = true;
                         return Ok(0);
                     }
+                    // The decoder would wait for ten bytes before it says so.
+                    Some(byte) if *byte != 0x1f => {
+                        let what = "the data do not begin as gzip data do";
+                        return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+                    }
                     Some(_) => self.state = State::Inside(Box::new(GzDecoder::new(stream))),
                 },
                 State::Trying(mut decoder) => match decoder.read(buffer) {

@@ -95,6 +95,7 @@ pub enum Warning {
     },
 }
 
+/// Numbers are written with an exponent where they are long.
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = |count: usize, one: &'static str, several: &'static str| match count {
@@ -113,15 +114,15 @@ impl fmt::Display for Warning {
             }
             Self::Spacing { axis, given } => {
                 let name = ["x", "y", "z"].get(*axis).unwrap_or(&"?");
-                write!(f, "the spacing along {name} is {given}; 1 is used")
+                write!(f, "the spacing along {name} is {given:?}; 1 is used")
             }
             Self::DataOffset { given, used } => write!(
                 f,
-                "the voxels are said to begin at byte {given}, inside the header; {used} is used"
+                "the voxels are said to begin at byte {given:?}, inside the header; {used} is used"
             ),
             Self::ScaleIgnored { slope, intercept } => write!(
                 f,
-                "slope {slope} and intercept {intercept} cannot be used; values are not scaled"
+                "slope {slope:?} and intercept {intercept:?} cannot be used; values are not scaled"
             ),
             Self::Bits { given, voxel_type } => write!(
                 f,
@@ -135,7 +136,7 @@ impl fmt::Display for Warning {
             }
             Self::PlacementSpacing { source, given } => write!(
                 f,
-                "{source} has other distances between voxels, which are not used: {} {} {}",
+                "{source} has other distances between voxels, which are not used: {:?} {:?} {:?}",
                 given[0], given[1], given[2]
             ),
             Self::UnknownFields {

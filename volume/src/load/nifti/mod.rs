@@ -106,7 +106,7 @@ fn offset(given: f64, least: u64, warnings: &mut Vec<Warning>) -> Result<u64, He
         return Err(HeaderError::Value {
             place: Place::Nowhere,
             field: "vox_offset",
-            found: given.to_string(),
+            found: format!("{given:?}"),
             expected: "a whole number",
         });
     }
