@@ -219,7 +219,8 @@ fn read(reader: &str, files: &Files, name: &str, number: u64) -> bool {
             ..
         }) => panic!("{bytes} bytes were asked for"),
         Err(error) => {
-            assert!(error.to_string().len() < 1000);
+            let length = error.to_string().len();
+            assert!(length < 1000, "a message of {length} bytes");
             false
         }
     }

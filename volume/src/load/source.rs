@@ -16,7 +16,10 @@ use std::{
 
 use flate2::bufread::GzDecoder;
 
-use super::{CompanionFiles, DataError, LoadError, error::quote};
+use super::{CompanionFiles, DataError, HeaderError, LoadError, Place, error::quote};
+
+/// Bytes of a path in a header at most.
+const MAX_NAME: usize = 800;
 
 /// A folder whose files can be read.
 pub(super) trait Folder {
@@ -267,6 +270,18 @@ pub(super) fn companion(
     name: &str,
     allowed: CompanionFiles,
 ) -> Result<PathBuf, LoadError> {
+    // What a header says ends up in messages.
+    if name.len() > MAX_NAME || name.chars().any(char::is_control) {
+        return Err(LoadError::Header {
+            path: shown.into(),
+            source: HeaderError::Value {
+                place: Place::Nowhere,
+                field: "file",
+                found: quote(name.as_bytes()),
+                expected: "a path of at most 800 bytes without control characters",
+            },
+        });
+    }
     let name = name.replace('\\', "/");
     let whole = Path::new(&name);
     let inside = whole
@@ -374,5 +389,8 @@ mod tests {
         }
         let anywhere = find("../a.raw", CompanionFiles::Anywhere);
         assert_eq!(anywhere, Some("../a.raw".into()));
+        for name in [&*"x".repeat(801), "a\u{1b}[31m", "a\nb"] {
+            assert_eq!(find(name, CompanionFiles::Anywhere), None);
+        }
     }
 }
