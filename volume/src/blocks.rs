@@ -65,7 +65,11 @@ fn bounds_of<T: Copy + PartialOrd + Into<f32> + Sync>(
                     let row = &values[(z * height + y) * width..][..width];
                     // A row on the border of two blocks bounds both.
                     let own = y >> shift;
-                    let before = if y % edge == 0 { own.saturating_sub(1) } else { own };
+                    let before = if y % edge == 0 {
+                        own.saturating_sub(1)
+                    } else {
+                        own
+                    };
                     let rows = before..=own.min(down - 1);
                     for x in 0..across {
                         let end = ((x + 1) * edge + 1).min(width);

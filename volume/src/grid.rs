@@ -8,94 +8,12 @@
 //!
 //! Invariants: every size is at least 1 and their product is the number of voxels; spacings are
 //! positive and finite; the slope is finite and not 0; the range is that of all finite voxels, and
-//! empty (0..0) if there is none.
+//! empty (0..0) if there is none; values at its ends are finite.
 
 use glam::Vec3;
 
-/// Items behind the last voxel: words of four bytes are read where two voxels are wanted.
-pub(crate) const PADDING: usize = 3;
-
-/// The type of raw values in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum VoxelType {
-    /// 8 bits without sign.
-    U8,
-    /// 16 bits without sign.
-    U16,
-    /// Floating point.
-    F32,
-}
-
-/// Raw values, x fastest, then y, then z.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Voxels {
-    /// 8 bits without sign.
-    U8(Vec<u8>),
-    /// 16 bits without sign.
-    U16(Vec<u16>),
-    /// Floating point; what is not finite is replaced when a [`Volume`] is made.
-    F32(Vec<f32>),
-}
-
-impl Voxels {
-    /// How many there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        match self {
-            Self::U8(values) => values.len(),
-            Self::U16(values) => values.len(),
-            Self::F32(values) => values.len(),
-        }
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The raw value at a place, as a number.
-    ///
-    /// # Panics
-    /// If there is no such place.
-    #[must_use]
-    pub fn get(&self, index: usize) -> f32 {
-        match self {
-            Self::U8(values) => values[index].into(),
-            Self::U16(values) => values[index].into(),
-            Self::F32(values) => values[index],
-        }
-    }
-
-    fn pad(&mut self) {
-        match self {
-            Self::U8(values) => values.extend([0; PADDING]),
-            Self::U16(values) => values.extend([0; PADDING]),
-            Self::F32(values) => values.extend([0.0; PADDING]),
-        }
-    }
-
-    /// The smallest and largest value that is not NaN; `None` if there is none.
-    fn range(&self) -> Option<[f32; 2]> {
-        fn of<T: Copy + PartialOrd>(values: &[T]) -> Option<[T; 2]> {
-            let mut finite = values.iter().copied().filter(|v| *v == *v);
-            let first = finite.next()?;
-            Some(finite.fold([first; 2], |[low, high], v| {
-                [
-                    if v < low { v } else { low },
-                    if v > high { v } else { high },
-                ]
-            }))
-        }
-        match self {
-            Self::U8(values) => Some(of(values)?.map(f32::from)),
-            Self::U16(values) => Some(of(values)?.map(f32::from)),
-            Self::F32(values) => of(values),
-        }
-    }
-}
+use crate::voxels::PADDING;
+pub use crate::voxels::{VoxelSlice, Voxels};
 
 /// How raw values become values: `value = raw · slope + intercept`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,10 +77,16 @@ pub enum GridError {
         spacing: [f32; 3],
     },
     /// The slope is 0, or slope or intercept is not finite.
-    #[error("slope {} and intercept {}: both must be finite, and the slope not 0", scale.slope, scale.intercept)]
+    #[error("slope {:?} and intercept {:?}: both must be finite, and the slope not 0", scale.slope, scale.intercept)]
     ValueScale {
         /// What was given.
         scale: ValueScale,
+    },
+    /// Slope and intercept lead out of single precision.
+    #[error("values from {:?} to {:?}: they must be finite", range[0], range[1])]
+    ValueRange {
+        /// The smallest and the largest value.
+        range: [f32; 2],
     },
 }
 
@@ -216,7 +140,7 @@ impl Volume {
         }
         let raw_range = voxels.range().unwrap_or([0.0; 2]);
         voxels.pad();
-        Ok(Self {
+        let volume = Self {
             dims,
             spacing,
             voxels,
@@ -225,7 +149,12 @@ impl Volume {
             raw_range,
             missing,
             clamped,
-        })
+        };
+        let range = volume.range();
+        if !range.iter().all(|value| value.is_finite()) {
+            return Err(GridError::ValueRange { range });
+        }
+        Ok(volume)
     }
 
     /// The same grid, placed in the space of its file.
@@ -285,14 +214,10 @@ impl Volume {
         &self.voxels
     }
 
-    /// The type of the raw values.
+    /// The raw values, x fastest.
     #[must_use]
-    pub fn voxel_type(&self) -> VoxelType {
-        match self.voxels {
-            Voxels::U8(_) => VoxelType::U8,
-            Voxels::U16(_) => VoxelType::U16,
-            Voxels::F32(_) => VoxelType::F32,
-        }
+    pub fn voxels(&self) -> VoxelSlice<'_> {
+        self.voxels.slice(self.len())
     }
 
     /// How raw values become values.
@@ -422,6 +347,16 @@ mod tests {
         let volume = volume(vec![f32::NAN, f32::INFINITY], 1.0);
         assert_eq!((volume.missing(), volume.clamped()), (1, 1));
         assert_eq!(volume.raw_range(), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn values_that_single_precision_cannot_hold() {
+        let scale = ValueScale {
+            slope: 1e38,
+            intercept: 0.0,
+        };
+        let result = Volume::new([2, 1, 1], [1.0; 3], Voxels::U8(vec![0, 9]), scale);
+        assert!(matches!(result, Err(GridError::ValueRange { .. })));
     }
 
     #[test]

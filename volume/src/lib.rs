@@ -7,12 +7,22 @@
 mod blocks;
 pub mod cast;
 mod distance;
+pub mod generate;
 pub mod grid;
+pub mod load;
+pub mod presets;
+pub mod statistics;
 mod table;
 pub mod transfer;
+pub mod view;
+mod voxels;
 
 pub use crate::{
     cast::{CastError, CastOptions, Picture, Raycaster, Skipping, Work},
-    grid::{GridError, Orientation, ValueScale, Volume, VoxelType, Voxels},
+    generate::Generated,
+    grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
+    load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},
+    statistics::Statistics,
     transfer::{ControlPoint, TransferError, TransferFunction},
+    view::View,
 };

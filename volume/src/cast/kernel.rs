@@ -12,8 +12,7 @@
 use raywright_bvh::simd::{GatherLanes, LaneKernel};
 
 use super::{
-    Frame, Work,
-    reference::RayResult,
+    Frame, RayResult, Work,
     view::{LAST_SAMPLE, SMALLEST_STEP},
 };
 use crate::table::ENTRY;

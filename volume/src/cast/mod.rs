@@ -8,7 +8,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 use raywright_bvh::Isa;
-use raywright_imaging::{Camera, CameraError, Image};
+use raywright_imaging::{Camera, CameraError, FilmError, Image};
 
 use crate::{
     blocks::Blocks,
@@ -18,7 +18,6 @@ use crate::{
     transfer::TransferFunction,
 };
 use kernel::TileKernel;
-use reference::RayResult;
 use view::View;
 
 /// Side of a tile, pixels.
@@ -52,6 +51,20 @@ impl Default for CastOptions {
     }
 }
 
+impl CastOptions {
+    fn check(&self) -> Result<(), CastError> {
+        if !(self.step > 0.0 && self.step.is_finite()) {
+            return Err(CastError::Step { step: self.step });
+        }
+        if self.termination.is_nan() || self.termination < 0.0 {
+            return Err(CastError::Termination {
+                termination: self.termination,
+            });
+        }
+        Ok(())
+    }
+}
+
 /// How empty space is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -66,9 +79,12 @@ pub enum Skipping {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CastError {
-    /// The camera or the size of the picture.
+    /// The camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// The size of the picture.
+    #[error(transparent)]
+    Size(#[from] FilmError),
     /// The step is not a positive number.
     #[error("a step of {step} voxels: it must be above 0 and finite")]
     Step {
@@ -145,6 +161,16 @@ struct Frame<'a> {
     distances: Option<&'a DistanceMap>,
 }
 
+/// What a ray found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RayResult {
+    /// Colour, multiplied by opacity.
+    pub(crate) colour: [f32; 3],
+    pub(crate) opacity: f32,
+    /// Number of the sample behind the last that was looked at; 0 if there was none.
+    pub(crate) end: f32,
+}
+
 /// Casts rays through a volume, from any camera with any transfer function.
 #[derive(Clone, Debug)]
 pub struct Raycaster<'a> {
@@ -179,37 +205,57 @@ impl<'a> Raycaster<'a> {
         &self,
         function: &TransferFunction,
         camera: &Camera,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
-        if !(options.step > 0.0 && options.step.is_finite()) {
-            return Err(CastError::Step { step: options.step });
-        }
-        if !(options.termination >= 0.0) {
-            return Err(CastError::Termination {
-                termination: options.termination,
-            });
-        }
+        self.picture(function, camera, size, options, |frame| {
+            cast_tiles(frame, size, options.isa)
+        })
+    }
+
+    /// The same picture by one ray after the other, which skips nothing and uses no lanes: slow, and
+    /// short enough to be checked by eye. What it took is not counted.
+    ///
+    /// # Errors
+    /// As [`Raycaster::render`].
+    pub fn render_slowly(
+        &self,
+        function: &TransferFunction,
+        camera: &Camera,
+        size: [u32; 2],
+        options: &CastOptions,
+    ) -> Result<Picture, CastError> {
+        self.picture(function, camera, size, options, |frame| {
+            let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+            let results = pixels.map(|(x, y)| reference::cast(frame, x, y));
+            (results.collect(), Work::default())
+        })
+    }
+
+    fn picture(
+        &self,
+        function: &TransferFunction,
+        camera: &Camera,
+        [width, height]: [u32; 2],
+        options: &CastOptions,
+        cast: impl FnOnce(&Frame<'_>) -> (Vec<RayResult>, Work),
+    ) -> Result<Picture, CastError> {
+        options.check()?;
         let projection = camera.projection(width, height)?;
-        let mut image =
-            Image::new(width, height).map_err(|_| CameraError::EmptyPicture { width, height })?;
+        let mut image = Image::new(width, height)?;
         let table = TransferTable::new(function, self.volume, options.step, DEFAULT_SIZE);
         let map = match options.skipping {
             Skipping::None => None,
             Skipping::Distance => Some(self.distance_map(&table)),
         };
-        let frame = Frame {
+        let step = options.step * self.volume.unit_length();
+        let (results, work) = cast(&Frame {
             volume: self.volume,
-            view: View::new(
-                self.volume,
-                &projection,
-                options.step * self.volume.unit_length(),
-            ),
+            view: View::new(self.volume, &projection, step),
             table: &table,
             termination: options.termination,
             distances: map.as_ref(),
-        };
-        let (results, work) = cast_tiles(&frame, [width, height], options.isa);
+        });
         for (pixel, result) in image.pixels_mut().iter_mut().zip(&results) {
             *pixel = result.colour;
         }

@@ -1,20 +1,10 @@
 //! The slow twin: one ray after the other, every sample of the box, nothing skipped.
 
 use super::{
-    Frame,
+    Frame, RayResult,
     view::{LAST_SAMPLE, SMALLEST_STEP, View},
 };
 use crate::{grid::Volume, table::ENTRY};
-
-/// What a ray found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RayResult {
-    /// Colour, multiplied by opacity.
-    pub(crate) colour: [f32; 3],
-    pub(crate) opacity: f32,
-    /// Number of the sample behind the last that was looked at; 0 if there was none.
-    pub(crate) end: f32,
-}
 
 /// Casts the ray through the centre of a pixel.
 pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {

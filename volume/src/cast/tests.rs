@@ -83,32 +83,6 @@ fn functions(volume: &Volume) -> [TransferFunction; 3] {
     ]
 }
 
-fn reference_picture(
-    caster: &Raycaster<'_>,
-    function: &TransferFunction,
-    camera: &Camera,
-    size: [u32; 2],
-    options: &CastOptions,
-) -> Vec<RayResult> {
-    let table = TransferTable::new(function, caster.volume, options.step, DEFAULT_SIZE);
-    let projection = camera.projection(size[0], size[1]).unwrap();
-    let frame = Frame {
-        volume: caster.volume,
-        view: View::new(
-            caster.volume,
-            &projection,
-            options.step * caster.volume.unit_length(),
-        ),
-        table: &table,
-        termination: options.termination,
-        distances: None,
-    };
-    (0..size[1])
-        .flat_map(|y| (0..size[0]).map(move |x| (x, y)))
-        .map(|(x, y)| reference::cast(&frame, x, y))
-        .collect()
-}
-
 fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
     let caster = Raycaster::new(volume).unwrap();
     for function in functions(volume) {
@@ -116,7 +90,9 @@ fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
             step,
             ..CastOptions::default()
         };
-        let expected = reference_picture(&caster, &function, camera, size, &options);
+        let expected = caster
+            .render_slowly(&function, camera, size, &options)
+            .unwrap();
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             for skipping in [Skipping::None, Skipping::Distance] {
                 let options = CastOptions {
@@ -125,11 +101,11 @@ fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
                     ..options
                 };
                 let picture = caster.render(&function, camera, size, &options).unwrap();
-                for (i, expected) in expected.iter().enumerate() {
-                    let got = (picture.image.pixels()[i], picture.opacity[i]);
+                for i in 0..picture.opacity.len() {
+                    let of = |p: &Picture| (p.image.pixels()[i], p.opacity[i], p.end[i]);
                     assert_eq!(
-                        got,
-                        (expected.colour, expected.opacity),
+                        of(&picture),
+                        of(&expected),
                         "pixel {i}, {isa}, {skipping:?}"
                     );
                 }
