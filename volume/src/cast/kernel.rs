@@ -23,10 +23,6 @@ const MOST_LANES: usize = 16;
 /// New rays are taken when so many of eight lanes are idle.
 const IDLE_EIGHTHS: u32 = 2;
 
-/// A place is so far from a border of blocks before it is taken to be beyond it, in voxels: more
-/// than positions of samples are off by.
-const BORDER: f32 = 1.0 / 64.0;
-
 /// Voxels of one type.
 pub(crate) trait Voxel: Copy + Sync {
     /// The values at places and behind them.
@@ -188,6 +184,7 @@ impl<V: Voxel> TileKernel<'_, V> {
         };
         let (blocks_across, blocks_down) = (L::splat_int(blocks_across), L::splat_int(blocks_down));
         let edge = L::splat((1_u32 << shift) as f32);
+        let border = L::splat(view.border);
 
         let mut lanes = LaneStates::<N>::idle();
         let mut next = 0;
@@ -218,7 +215,11 @@ impl<V: Voxel> TileKernel<'_, V> {
             let mut g = L::load(&lanes.colour[1]);
             let mut b = L::load(&lanes.colour[2]);
             let mut opacity = L::load(&lanes.opacity);
-            let per_voxel = one.div(step_x.abs().max(step_y.abs()).max(step_z.abs()));
+            let exits = [
+                Exit::<L>::new::<N>(step_x, edge, border),
+                Exit::<L>::new::<N>(step_y, edge, border),
+                Exit::<L>::new::<N>(step_z, edge, border),
+            ];
             let enough = if next < waiting.len() { refill } else { 1 };
             loop {
                 let active = k.le(last);
@@ -233,23 +234,22 @@ impl<V: Voxel> TileKernel<'_, V> {
                 let cell_y = L::min_int(y.truncate(), last_cell[1]);
                 let cell_z = L::min_int(z.truncate(), last_cell[2]);
                 if SKIP && let Some(map) = self.frame.distances {
-                    let block = L::add_int(
-                        L::mul_int(
-                            L::add_int(
-                                L::mul_int(L::shift_int(cell_z, shift), blocks_down),
-                                L::shift_int(cell_y, shift),
-                            ),
-                            blocks_across,
-                        ),
-                        L::shift_int(cell_x, shift),
-                    );
+                    let block_x = L::shift_int(cell_x, shift);
+                    let block_y = L::shift_int(cell_y, shift);
+                    let block_z = L::shift_int(cell_z, shift);
+                    let block = L::add_int(L::mul_int(block_z, blocks_down), block_y);
+                    let block = L::add_int(L::mul_int(block, blocks_across), block_x);
                     let distance = L::from_int(L::gather_bytes(&map.distances, block));
                     let is_empty = zero.lt(distance) & active;
                     if L::bits(is_empty) != 0 {
-                        // So many voxels lie ahead in which there is nothing, along every axis.
-                        let room = distance.sub(one).mul(edge).sub(L::splat(BORDER));
-                        let skipped = room.mul(per_voxel).max(zero).floor().add(one);
-                        k = L::select(is_empty, k.add(skipped), k);
+                        let along_x =
+                            exits[0].samples::<N>(L::from_int(block_x), distance, edge, x);
+                        let along_y =
+                            exits[1].samples::<N>(L::from_int(block_y), distance, edge, y);
+                        let along_z =
+                            exits[2].samples::<N>(L::from_int(block_z), distance, edge, z);
+                        let inside = along_x.min(along_y).min(along_z).max(zero).floor();
+                        k = L::select(is_empty, k.add(inside).add(one), k);
                         skips += u64::from(L::bits(is_empty).count_ones());
                         continue;
                     }
@@ -320,6 +320,49 @@ impl<V: Voxel> TileKernel<'_, V> {
         self.work.samples += samples;
         self.work.lit_samples += lit_samples;
         self.work.skips += skips;
+    }
+}
+
+/// Where a ray leaves the blocks around it along one axis.
+struct Exit<L> {
+    /// 1 or −1.
+    sign: L,
+    /// The far border of a block against its near one, less the margin, in voxels.
+    border: L,
+    /// Samples per voxel, with the sign of the step.
+    per_voxel: L,
+}
+
+impl<L> Exit<L> {
+    #[inline(always)]
+    fn new<const N: usize>(step: L, edge: L, margin: L) -> Self
+    where
+        L: GatherLanes<N>,
+    {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let is_back = step.lt(zero);
+        let sign = L::select(is_back, L::splat(-1.0), one);
+        // A ray that stands still along this axis has a long way to go.
+        let size = step.abs().max(L::splat(SMALLEST_STEP));
+        Self {
+            sign,
+            border: L::select(is_back, edge, zero).sub(sign.mul(margin)),
+            per_voxel: sign.div(size),
+        }
+    }
+
+    /// So many samples on is the border of the cube of blocks around `block` in which nothing can be
+    /// seen, `distance` being that of the nearest block in which something can.
+    #[inline(always)]
+    fn samples<const N: usize>(&self, block: L, distance: L, edge: L, place: L) -> L
+    where
+        L: GatherLanes<N>,
+    {
+        let border = block
+            .add(self.sign.mul(distance))
+            .mul(edge)
+            .add(self.border);
+        border.sub(place).mul(self.per_voxel)
     }
 }
 

@@ -25,6 +25,8 @@ pub(crate) struct View {
     pub(crate) high: [f32; 3],
     /// The last voxel; samples beyond are moved onto it.
     pub(crate) last_voxel: [f32; 3],
+    /// More than any position of a sample in the box is off by, in voxels.
+    pub(crate) border: f32,
 }
 
 impl View {
@@ -38,14 +40,18 @@ impl View {
         let per_axis = |value: fn(f32, f32) -> f32, of: [f32; 3]| {
             std::array::from_fn(|axis| value(of[axis], spacing[axis]))
         };
+        let eye = per_axis(|o, s| (f64::from(o) / f64::from(s)) as f32, origin);
+        let farthest = |axis: usize| eye[axis].abs() + last_voxel[axis];
+        let farthest = farthest(0).max(farthest(1)).max(farthest(2));
         Self {
-            eye: per_axis(|o, s| (f64::from(o) / f64::from(s)) as f32, origin),
+            eye,
             frame: projection.frame().map(|v| v.to_array()),
             centre: projection.centre(),
             scale: per_axis(|step, s| step / s, [step; 3]),
             low: is_thin.map(|thin| if thin { -0.5 } else { 0.0 }),
             high: std::array::from_fn(|axis| if is_thin[axis] { 0.5 } else { last_voxel[axis] }),
             last_voxel,
+            border: (1.0 / 64.0_f32).max(4.0 * f32::EPSILON * farthest),
         }
     }
 }
