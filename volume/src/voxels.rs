@@ -29,6 +29,26 @@ impl Voxels {
         self.len() == 0
     }
 
+    /// The type of each, by its name in Rust.
+    #[must_use]
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::U8(_) => "u8",
+            Self::U16(_) => "u16",
+            Self::F32(_) => "f32",
+        }
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::U8(values) => size_of_val(&values[..]),
+            Self::U16(values) => size_of_val(&values[..]),
+            Self::F32(values) => size_of_val(&values[..]),
+        }
+    }
+
     /// The raw value at a place, as a number.
     ///
     /// # Panics
