@@ -8,7 +8,7 @@ pub enum Voxels {
     U8(Vec<u8>),
     /// 16 bits without sign.
     U16(Vec<u16>),
-    /// Floating point; what is not finite is replaced when a [`Volume`] is made.
+    /// Floating point; what is not finite is replaced when a [`Volume`](crate::grid::Volume) is made.
     F32(Vec<f32>),
 }
 
