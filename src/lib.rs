@@ -16,7 +16,7 @@
 #![forbid(unsafe_code)]
 
 pub use raywright_bvh as bvh;
-#[cfg(feature = "tracer")]
+#[cfg(any(feature = "tracer", feature = "volume"))]
 pub use raywright_imaging as imaging;
 #[cfg(feature = "tracer")]
 pub use raywright_tracer as tracer;

@@ -5,9 +5,11 @@ mod failure;
 mod inspect;
 mod output;
 mod render;
+mod rows;
 mod run_options;
 mod scene;
 mod tune;
+mod volume;
 
 use clap::{Parser, Subcommand};
 
@@ -18,7 +20,9 @@ pub(crate) use failure::Failure;
 #[command(version, about, max_term_width = 100)]
 #[command(after_help = "\
 Exit codes: 0 done, 1 a check failed, 2 bad input or usage, 130 interrupted.
-A SCENE is a file (.obj, .obj.gz) or a built-in scene (interior, voxel-terrain).")]
+A SCENE is a file (.obj, .obj.gz) or a built-in scene (interior, voxel-terrain).
+A VOLUME is a file (.nrrd, .nhdr, .nii, .nii.gz, .hdr, .img, .json, .raw) or a generated volume
+(supernova, nebula, marschner-lobb).")]
 pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -37,6 +41,9 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
     Demo(demo::DemoArgs),
+    /// Volumes: what is in a file
+    #[command(subcommand)]
+    Volume(volume::VolumeCommand),
 }
 
 /// Runs a command.
@@ -46,5 +53,6 @@ pub(crate) fn run(cli: Cli) -> Result<(), Failure> {
         Command::Tune(args) => tune::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Volume(command) => volume::run(&command),
     }
 }

@@ -212,6 +212,9 @@ fn read(reader: &str, files: &Files, name: &str, number: u64) -> bool {
             let range = loaded.volume.range();
             assert!(range.iter().all(|value| value.is_finite()), "{range:?}");
             assert!(loaded.volume.extent().is_finite());
+            for axis in loaded.volume.orientation().axes {
+                assert!((axis.length() - 1.0).abs() < 1e-4, "{axis}");
+            }
             true
         }
         Err(LoadError::Data {

@@ -199,7 +199,7 @@ impl Volume {
     #[must_use]
     pub fn raw(&self, index: usize) -> f32 {
         assert!(index < self.len(), "no such voxel");
-        self.voxels.get(index)
+        self.voxels().get(index)
     }
 
     /// How many voxels there are; at least one.

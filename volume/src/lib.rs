@@ -2,6 +2,16 @@
 //!
 //! It stands on `raywright-bvh` (the non-empty blocks of voxels and their boundary are primitives
 //! like any other) and on `raywright-imaging`, and knows nothing of the path tracer.
+//!
+//! | module | what it answers |
+//! | --- | --- |
+//! | [`grid`] | what a volume is |
+//! | [`load`] | which volume a file has: NRRD, NIfTI, raw |
+//! | [`generate`] | a volume without a file |
+//! | [`transfer`], [`presets`] | what a value looks like |
+//! | [`view`] | transfer functions and cameras of a file; a camera without one |
+//! | [`statistics`] | mean and percentiles |
+//! | [`cast`] | a picture of a volume |
 #![forbid(unsafe_code)]
 
 mod blocks;

@@ -192,6 +192,9 @@ fn read(path: &Path) -> Result<Vec<u8>, ViewError> {
         path: path.into(),
         source,
     };
+    if !std::fs::metadata(path).map_err(io_fault)?.is_file() {
+        return Err(io_fault(io::Error::other("not a regular file")));
+    }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(io_fault)?;
     let mut limited = file.take(MAX_BYTES + 1);

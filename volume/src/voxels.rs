@@ -12,37 +12,17 @@ pub enum Voxels {
     U8(Vec<u8>),
     /// 16 bits without sign.
     U16(Vec<u16>),
-    /// Floating point; what is not finite is replaced when a [`Volume`] is made.
+    /// Floating point; what is not finite is replaced when a [`Volume`](crate::grid::Volume) is made.
     F32(Vec<f32>),
 }
 
 impl Voxels {
     /// How many there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::U8(values) => values.len(),
             Self::U16(values) => values.len(),
             Self::F32(values) => values.len(),
-        }
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The raw value at a place, as a number.
-    ///
-    /// # Panics
-    /// If there is no such place.
-    #[must_use]
-    pub fn get(&self, index: usize) -> f32 {
-        match self {
-            Self::U8(values) => values[index].into(),
-            Self::U16(values) => values[index].into(),
-            Self::F32(values) => values[index],
         }
     }
 
@@ -115,6 +95,26 @@ impl VoxelSlice<'_> {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The type of each, by its name in Rust.
+    #[must_use]
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::U8(_) => "u8",
+            Self::U16(_) => "u16",
+            Self::F32(_) => "f32",
+        }
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::U8(values) => size_of_val(&values[..]),
+            Self::U16(values) => size_of_val(&values[..]),
+            Self::F32(values) => size_of_val(&values[..]),
+        }
     }
 
     /// The raw value at a place, as a number.

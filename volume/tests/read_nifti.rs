@@ -76,6 +76,9 @@ fn pairs_by_either_name() {
             let loaded = read_volume(&files, name, &LoadOptions::default()).unwrap();
             assert_eq!(loaded.volume.range(), [-5.0, 6.0]);
         }
+        // Half of a pair under the name of a single file.
+        let header = files["a.hdr"].clone();
+        assert!(header_error(read(header)).to_string().contains("NAME.img"));
         files.remove(image);
         let alone = read_volume(&files, "a.hdr", &LoadOptions::default());
         let Err(LoadError::Io { path, .. }) = alone else {

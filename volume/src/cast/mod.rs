@@ -122,7 +122,8 @@ pub struct Work {
 }
 
 impl Work {
-    fn add(&mut self, other: &Self) {
+    /// Adds what another picture took.
+    pub fn add(&mut self, other: &Self) {
         self.rays += other.rays;
         self.samples += other.samples;
         self.lit_samples += other.lit_samples;

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::{
     DataError, Endian, Format, HeaderError, LoadError, LoadOptions, Loaded, MissingValues,
     Placement, SourceFacts, VoxelType, Warning, decode::decode, source::Body,
@@ -152,6 +154,14 @@ pub(super) fn usable_spacing(spacing: [f64; 3], warnings: &mut Vec<Warning>) -> 
     })
 }
 
+/// The direction of a vector of any length but 0: scaled first, since the square of a tiny or huge
+/// length has lost its digits or left the range.
+pub(super) fn direction(vector: DVec3) -> Option<DVec3> {
+    let largest = vector.abs().max_element();
+    let usable = largest > 0.0 && vector.is_finite();
+    usable.then(|| (vector / largest).normalize())
+}
+
 /// The scaling of raw values, none if that of the file is none: a slope of 0 means so in NIfTI, and
 /// NaN or infinite ones occur.
 fn usable_scale(
@@ -194,6 +204,19 @@ mod tests {
         assert_eq!((used, warnings.len()), ([2.0, 1.0, 1.0], 2));
         let used = usable_spacing([f64::INFINITY, 1e300, 1e-300], &mut warnings);
         assert_eq!((used, warnings.len()), ([1.0; 3], 5));
+    }
+
+    #[test]
+    fn directions_of_any_length() {
+        for length in [5e-324, 1e-162, 1e-300, 1.0, 1e300, f64::MAX] {
+            let found = direction(DVec3::new(0.0, -length, length * 0.0));
+            assert_eq!(found, Some(DVec3::NEG_Y), "{length}");
+        }
+        let slanted = direction(DVec3::splat(3e-162)).unwrap();
+        assert!((slanted.length() - 1.0).abs() < 1e-15);
+        for none in [DVec3::ZERO, DVec3::NAN, DVec3::INFINITY] {
+            assert_eq!(direction(none), None);
+        }
     }
 
     #[test]

@@ -65,7 +65,14 @@ pub(super) fn load(
         let start = offset(header.data_offset, least, &mut warnings).map_err(header_fault)?;
         start - version.size as u64
     } else {
-        let names = sibling(&name, ".hdr", ".img").unwrap_or_default();
+        let names = sibling(&name, ".hdr", ".img").ok_or_else(|| {
+            header_fault(HeaderError::Value {
+                place: Place::Nowhere,
+                field: "magic",
+                found: "of a pair".into(),
+                expected: "that of a single file, or the name NAME.hdr beside NAME.img,",
+            })
+        })?;
         let image = first_there(folder, &names).ok_or_else(|| {
             let wanted = names.first().cloned().unwrap_or_else(|| name.clone());
             io_fault(folder.shown(&wanted))(io::ErrorKind::NotFound.into())

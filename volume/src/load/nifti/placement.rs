@@ -7,7 +7,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::{
-    super::{Placement, PlacementSource, Warning},
+    super::{Placement, PlacementSource, Warning, layout::direction},
     header::Fields,
 };
 use crate::grid::Orientation;
@@ -107,7 +107,7 @@ fn qform(fields: &Fields<'_>) -> Option<Orientation> {
 fn orientation(columns: [DVec3; 3], origin: DVec3) -> Option<Orientation> {
     let mut axes = [DVec3::ZERO; 3];
     for (axis, column) in axes.iter_mut().zip(columns) {
-        *axis = column.try_normalize()?;
+        *axis = direction(column)?;
     }
     let [x, y, z] = axes;
     let flat = x.cross(y).dot(z).abs() < 1e-9;

@@ -8,7 +8,9 @@ use glam::DVec3;
 
 use super::{
     super::{
-        HeaderError, Place, Placement, PlacementSource, Warning, error::quote, layout::Layout,
+        HeaderError, Place, Placement, PlacementSource, Warning,
+        error::quote,
+        layout::{Layout, direction as unit},
         voxel_type::Endian,
     },
     lines::{Field, Lines},
@@ -197,7 +199,7 @@ fn space(
                 continue;
             };
             spacing[axis] = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
-            let direction = three(direction).and_then(|d| d.try_normalize());
+            let direction = three(direction).and_then(unit);
             given[axis] = direction;
         }
         directions = match given {

@@ -1,0 +1,183 @@
+//! `raywright volume` as a user meets it: results, messages, exit codes.
+
+#![cfg(feature = "cli")]
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+use serde_json::{Value, json};
+
+fn raywright(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_raywright"));
+    command.args(args).current_dir(folder);
+    command.output().expect("the binary runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+const HEADER: &str = "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 2\nencoding: raw\n\
+                      endian: little\nspace directions: (2,0,0) (0,2,0) (0,0,3)\n";
+
+fn voxels() -> Vec<u8> {
+    (-5_i16..7).flat_map(i16::to_le_bytes).collect()
+}
+
+/// Runs `volume info` with these arguments in a folder with these files.
+fn info(files: &[(&str, &[u8])], args: &[&str]) -> Output {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, bytes) in files {
+        fs::write(folder.path().join(name), bytes).expect("a file");
+    }
+    raywright(folder.path(), &[&["volume", "info"], args].concat())
+}
+
+fn report(output: &Output) -> Value {
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("one JSON object")
+}
+
+#[test]
+fn info_of_a_file() {
+    let bytes = [HEADER.as_bytes(), b"\n", &voxels()].concat();
+    let output = info(&[("a.nrrd", &bytes)], &["a.nrrd", "--json"]);
+    let report = report(&output);
+    for (name, value) in [
+        ("schema_version", json!(1)),
+        ("format", json!("NRRD")),
+        ("dims", json!([3, 2, 2])),
+        ("spacing", json!([2.0, 2.0, 3.0])),
+        ("type", json!("i16")),
+        ("endian", json!("little")),
+        ("memory_type", json!("u16")),
+        ("range", json!([-5.0, 6.0])),
+        ("mean", json!(0.5)),
+        ("missing", json!(0)),
+        ("data_bytes", json!(24)),
+        ("warnings", json!([])),
+    ] {
+        assert_eq!(report[name], value, "{name}");
+    }
+    assert_eq!(report["orientations"][0]["source"], "the space directions");
+    assert!(output.stderr.is_empty());
+    let plain = info(&[("a.nrrd", &bytes)], &["a.nrrd"]);
+    let printed = text(&plain.stdout);
+    for expected in ["3 x 2 x 2", "i16, little", "-5 .. 6", "orientation by"] {
+        assert!(printed.contains(expected), "{printed}");
+    }
+}
+
+#[test]
+fn what_is_unusual_is_noted() {
+    let bytes = [HEADER.as_bytes(), b"foo: bar\n\n", &voxels(), b"more"].concat();
+    let output = info(&[("a.nrrd", &bytes)], &["a.nrrd", "--json"]);
+    let notes = text(&output.stderr);
+    assert!(notes.contains("note: 1 header field is unknown"), "{notes}");
+    assert!(notes.contains("note: 4 bytes behind the voxels"), "{notes}");
+    assert_eq!(
+        report(&output)["warnings"].as_array().map(Vec::len),
+        Some(2)
+    );
+}
+
+#[test]
+fn raw_voxels_and_missing_values() {
+    let values = [1.0_f32, f32::NAN, 3.0, f32::INFINITY];
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
+    let files = [("a.dat", &bytes[..])];
+    let args = [
+        "a.dat",
+        "--json",
+        "--dims",
+        "2,2,1",
+        "--type",
+        "f32",
+        "--endian",
+        "big",
+        "--spacing",
+        "1,1,2.5",
+    ];
+    let seen = report(&info(&files, &args));
+    assert_eq!(
+        (&seen["missing"], &seen["infinite"]),
+        (&json!(1), &json!(1))
+    );
+    assert_eq!(seen["range"], json!([1.0, 3.0]));
+    assert_eq!(seen["spacing"], json!([1.0, 1.0, 2.5]));
+    let filled = report(&info(&files, &[&args[..], &["--fill", "-7"]].concat()));
+    assert_eq!(
+        (&filled["missing"], &filled["range"]),
+        (&json!(0), &json!([-7.0, 3.0]))
+    );
+}
+
+#[test]
+fn generated_volumes_need_no_file() {
+    for name in ["supernova", "nebula", "marschner-lobb"] {
+        let seen = report(&info(&[], &[name, "--json", "--dims", "20,16,12"]));
+        assert_eq!(
+            (&seen["format"], &seen["dims"]),
+            (&json!("generated"), &json!([20, 16, 12]))
+        );
+    }
+}
+
+#[test]
+fn failures_have_a_cause_a_hint_and_exit_code_2() {
+    let cut = [HEADER.as_bytes(), b"\n", &voxels()[..20]].concat();
+    let outside = format!("{HEADER}data file: ../a.raw\n");
+    let bad = HEADER.replace("3 2 2", "3 0 2") + "\n";
+    let files = [
+        ("cut.nrrd", &cut[..]),
+        ("outside.nhdr", outside.as_bytes()),
+        ("bad.nrrd", bad.as_bytes()),
+        ("a.raw", b"abcd"),
+        ("a.vti", b"abcd"),
+        ("a.nii", b"not a header at all"),
+    ];
+    for (args, expected) in [
+        (
+            &["cut.nrrd"][..],
+            &["24 bytes of voxels are needed, 20 are there"][..],
+        ),
+        (&["outside.nhdr"], &["../a.raw", "hint:", "--data-anywhere"]),
+        (&["bad.nrrd"], &["bad.nrrd", "line 4", "`sizes` is `3 0 2`"]),
+        (&["a.raw"], &["description", "hint:", "--type"]),
+        (&["a.vti"], &["unknown volume format", ".nii.gz", "--dims"]),
+        (&["a.nii"], &["not a NIfTI file"]),
+        (&["nowhere.nrrd"], &["nowhere.nrrd", "hint:", "supernova"]),
+        (&["a.raw", "--dims", "2,2,1"], &["--dims", "--type"]),
+        (
+            &["a.raw", "--dims", "2,2,1", "--type", "i64"],
+            &["i64", "f64"],
+        ),
+        (
+            &["a.raw", "--dims", "2,1,1", "--type", "u16"],
+            &["order of the bytes"],
+        ),
+        (
+            &["a.raw", "--dims", "2,2", "--type", "u8"],
+            &["three numbers"],
+        ),
+        (&["a.raw", "--type", "u8"], &["--dims"]),
+        (&["nebula", "--dims", "0,1,1"], &["has none", "hint:"]),
+        (
+            &["nebula", "--dims", "9999999,9999999,9999999"],
+            &["too many"],
+        ),
+    ] {
+        let output = info(&files, args);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
+        for part in expected {
+            assert!(
+                message.contains(part),
+                "{args:?}: {part:?} is not in: {message}"
+            );
+        }
+    }
+}
