@@ -27,6 +27,9 @@ pub enum ToneCurve {
     Clamp,
     /// x/(1 + x): everything is visible, nothing is quite white.
     Reinhard,
+    /// x as the value of the screen itself, cut off at 1: for colours that were chosen on a screen,
+    /// as those of transfer functions are, and mixed as such.
+    Screen,
 }
 
 impl Display {
@@ -39,6 +42,7 @@ impl Display {
             ToneCurve::Clamp => positive.min(1.0),
             // The same as x/(1 + x), but 1 instead of ∞/∞ at infinity.
             ToneCurve::Reinhard => 1.0 - 1.0 / (1.0 + positive),
+            ToneCurve::Screen => return (positive.min(1.0) * 255.0).round() as u8,
         };
         (srgb_from_linear(toned) * 255.0).round() as u8
     }
@@ -56,6 +60,19 @@ fn srgb_from_linear(linear: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn values_of_the_screen_pass_through() {
+        let display = Display {
+            curve: ToneCurve::Screen,
+            ..Display::default()
+        };
+        for byte in 0..=255_u8 {
+            assert_eq!(display.encode(f32::from(byte) / 255.0), byte);
+        }
+        let odd = [-1.0, f32::NAN, 2.0, f32::INFINITY];
+        assert_eq!(odd.map(|v| display.encode(v)), [0, 0, 255, 255]);
+    }
 
     const CLAMP: Display = Display {
         exposure_ev: 0.0,

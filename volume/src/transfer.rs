@@ -8,13 +8,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Linear red, green, blue and opacity at a value.
+/// Red, green, blue and opacity at a value. Colours are mixed as they are given: as values of a
+/// screen, if they were chosen on one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f32; 5]", into = "[f32; 5]")]
 pub struct ControlPoint {
     /// The value, after slope and intercept.
     pub value: f32,
-    /// Linear RGB.
+    /// RGB.
     pub colour: [f32; 3],
     /// The opacity of one voxel's length.
     pub opacity: f32,
@@ -142,7 +143,7 @@ impl TransferFunction {
         &self.points
     }
 
-    /// Linear RGB and opacity of a value.
+    /// RGB and opacity of a value.
     #[must_use]
     pub fn at(&self, value: f64) -> [f64; 4] {
         let next = self.points.partition_point(|p| f64::from(p.value) <= value);

@@ -9,7 +9,7 @@ use std::{
 use clap::{Args, ValueEnum};
 use raywright::{
     bvh::Vec3,
-    imaging::{Camera, write_image},
+    imaging::{Camera, Display, ToneCurve, write_image, write_png},
     volume::{
         CastOptions, Picture, Raycaster, Skipping, Statistics, TransferFunction, View, Volume,
         Work, presets,
@@ -48,7 +48,7 @@ pub(crate) struct RenderArgs {
     /// Vertical field of view of a camera of nine numbers, degrees
     #[arg(long, default_value_t = 30.0)]
     fov: f32,
-    /// Where the picture goes: .png, .exr or .pfm (default: VOLUME.png in the current folder); with --orbit, -0000 and so on is added to the name
+    /// Where the picture goes: .png, or .exr or .pfm with the colours of the transfer function as they are (default: VOLUME.png in the current folder); --orbit adds -0000 and so on to the name
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Width in pixels
@@ -301,7 +301,18 @@ fn write(picture: &Picture, path: &Path, frame: Option<u32>) -> Result<(), Failu
             path.with_file_name(format!("{stem}-{frame:04}.{ending}"))
         }
     };
-    Ok(write_image(&path, &picture.image)?)
+    // Colours of transfer functions are those of a screen.
+    let screen = Display {
+        curve: ToneCurve::Screen,
+        ..Display::default()
+    };
+    match path.extension() {
+        Some(ending) if ending.eq_ignore_ascii_case("png") => {
+            write_png(&path, &picture.image, &screen)?;
+        }
+        _ => write_image(&path, &picture.image)?,
+    }
+    Ok(())
 }
 
 #[cfg(test)]

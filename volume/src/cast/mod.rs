@@ -134,7 +134,7 @@ impl Work {
 /// A picture of a volume.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Linear RGB over black.
+    /// RGB over black, in the colours of the transfer function: those of a screen, as a rule.
     pub image: Image,
     /// Opacity of each pixel, row by row.
     pub opacity: Vec<f32>,
