@@ -181,3 +181,76 @@ fn failures_have_a_cause_a_hint_and_exit_code_2() {
         }
     }
 }
+
+#[test]
+fn rendering_is_the_same_whatever_changes_speed_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let picture = |name: &str, more: &[&str]| {
+        let fixed = [
+            "volume",
+            "render",
+            "supernova",
+            "--dims",
+            "40,40,40",
+            "--tf",
+            "fire",
+        ];
+        let size = ["--width", "60", "--height", "45", "-o", name];
+        let output = raywright(folder.path(), &[&fixed[..], &size, more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        fs::read(folder.path().join(name)).expect("a picture")
+    };
+    let first = picture("a.png", &[]);
+    for more in [
+        &["--skipping", "none"][..],
+        &["--isa", "portable"],
+        &["--threads", "1"],
+    ] {
+        assert_eq!(picture("b.png", more), first, "{more:?}");
+    }
+    assert_ne!(picture("b.png", &["--step", "4"]), first);
+}
+
+#[test]
+fn an_orbit_leaves_numbered_frames_and_one_report() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = "volume render marschner-lobb --dims 20,20,20 --width 16 --height 16 --orbit 3 -o ml.png --json";
+    let output = raywright(folder.path(), &args.split(' ').collect::<Vec<_>>());
+    let report = report(&output);
+    assert_eq!(
+        (&report["frames"], &report["interrupted"]),
+        (&json!(3), &json!(false))
+    );
+    assert!(report["samples"].as_u64() > report["rays"].as_u64());
+    let frames: Vec<_> = (0..3)
+        .map(|i| fs::read(folder.path().join(format!("ml-000{i}.png"))).expect("a frame"))
+        .collect();
+    assert!(frames[0] != frames[1] && frames[1] != frames[2]);
+    assert!(!folder.path().join("ml.png").exists());
+}
+
+#[test]
+fn what_cannot_be_rendered_says_what_may_be_tried() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (args, cause, hint) in [
+        (
+            "--tf bones",
+            "no transfer function bones",
+            "presets are ramp",
+        ),
+        ("--camera side", "no camera side", "nine numbers"),
+        ("--camera 1,1,1,1,1,1,0,0,1", "no direction of view", ""),
+        ("--step 0", "above 0", ""),
+        ("--termination nan", "termination", ""),
+        ("--width 0", "0", ""),
+    ] {
+        let line = format!("volume render nebula --dims 8,8,8 {args}");
+        let output = raywright(folder.path(), &line.split(' ').collect::<Vec<_>>());
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args}: {message}");
+        assert!(
+            message.contains(cause) && message.contains(hint),
+            "{args}: {message}"
+        );
+    }
+}

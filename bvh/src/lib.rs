@@ -26,8 +26,8 @@ mod layout;
 mod mesh;
 mod params;
 mod ray;
-#[allow(unsafe_code)]
 #[doc(hidden)]
+#[allow(unsafe_code)]
 pub mod simd;
 mod stats;
 mod traverse;
