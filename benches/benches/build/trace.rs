@@ -8,7 +8,7 @@ use raywright_benches::{
     scenes::BenchScene,
     turns::{geometric_mean, measure_chunks},
 };
-use raywright_bvh::{Bvh, Isa, Quality, Ray};
+use raywright_bvh::{BuildParams, Bvh, Isa, Quality, Ray};
 use raywright_validation::embree::{BuildQuality, Device, SceneSettings};
 
 use super::builds::params_of;
@@ -74,8 +74,14 @@ impl Summary {
             Quality::Optimized,
         ] {
             for width in WIDTHS {
-                let mut params = params_of(quality);
-                params.branching_factor = width;
+                let params = match (quality, width) {
+                    (Quality::BinnedSah, 16) => BuildParams::sixteen_children(),
+                    _ => {
+                        let mut params = params_of(quality);
+                        params.branching_factor = width;
+                        params
+                    }
+                };
                 match Bvh::build(&[&scene.mesh], &params) {
                     Ok(tree) => {
                         places.push(((quality, width), engines.len()));
