@@ -443,3 +443,67 @@ mod x86 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the operations give for a few operands, as bits.
+    struct Probe {
+        x: f32,
+        y: f32,
+        index: i32,
+    }
+
+    impl LaneKernel for Probe {
+        type Output = Vec<u32>;
+
+        #[inline(always)]
+        fn run<const N: usize, L: GatherLanes<N>>(self) -> Vec<u32> {
+            let (x, y) = (L::splat(self.x), L::splat(self.y));
+            let index = L::splat_int(self.index);
+            let bytes = [9, 8, 7, 6, 5_u8];
+            let words = [500, 400, 300_u16];
+            let floats = [0.25, 0.5, 0.75_f32];
+            let [a, b] = L::gather_pairs_u8(&bytes, index);
+            let [c, d] = L::gather_pairs_u16(&words, index);
+            let [e, f] = L::gather_pairs_f32(&floats, index);
+            let is_less = x.lt(y);
+            let sum = L::add_int(x.truncate(), y.round());
+            [
+                x.abs().sqrt(),
+                x.floor(),
+                L::select(is_less, x, y),
+                L::from_int(sum),
+                L::from_int(L::min_int(L::mul_int(sum, index), sum)),
+                L::from_int(L::shift_int(sum, 3)),
+                L::gather(&floats, index, is_less),
+                L::from_int(L::gather_bytes(&bytes, index)),
+                a,
+                b,
+                c,
+                d,
+                e,
+                f,
+            ]
+            .iter()
+            .map(|lanes| lanes.store()[N - 1].to_bits())
+            .collect()
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits_inside_the_tables() {
+        let numbers = [0.0, -0.0, 0.5, 1.5, -2.5, 7.99, -1e6, 3e8];
+        for (x, y) in numbers.iter().flat_map(|x| numbers.map(|y| (*x, y))) {
+            // Far outside too: an index is limited before anything is read.
+            for index in [0, 1, 2, 5, -1, i32::MAX, i32::MIN] {
+                let by = |isa| run(isa, Probe { x, y, index });
+                let expected = by(Isa::Portable);
+                for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                    assert_eq!(by(isa), expected, "{isa}, {x}, {y}, {index}");
+                }
+            }
+        }
+    }
+}

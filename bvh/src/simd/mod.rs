@@ -1,8 +1,8 @@
 //! The SIMD room: the only place of this crate with `unsafe`.
 //!
 //! Four layers after BurntSushi/memchr: [`Lanes`] is the handful of operations that traversal
-//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; [`portable`], [`avx2`]
-//! and [`avx512`] are the implementations; [`dispatch`] enters one kernel per instruction set,
+//! needs; `traverse::kernel` is the algorithm over it, `#[inline(always)]`; `portable`, `avx2`
+//! and `avx512` are the implementations; `dispatch` enters one kernel per instruction set,
 //! chosen once by [`Isa`].
 //!
 //! Invariant: the operations of [`Lanes`] other than [`Lanes::mul_add`] round once each in the

@@ -9,7 +9,7 @@
 //! Invariants: operations and their order are those of `reference`, none fused, so that every pixel
 //! has its bits; a sample that is skipped has opacity 0 and would change nothing.
 
-use raywright_bvh::simd::{GatherLanes, LaneKernel};
+use raywright_bvh::simd::{GatherLanes, LaneKernel, splat_all};
 
 use super::{
     Frame, RayResult, Work,
@@ -117,22 +117,21 @@ impl<V: Voxel> TileKernel<'_, V> {
         let across = x.sub(L::splat(view.centre[0]));
         let down = y.sub(L::splat(view.centre[1]));
         let mut d = [across; 3];
-        for axis in 0..3 {
+        for (axis, d) in d.iter_mut().enumerate() {
             let forward = L::splat(view.frame[0][axis]);
             let right = L::splat(view.frame[1][axis]).mul(across);
             let below = L::splat(view.frame[2][axis]).mul(down);
-            d[axis] = forward.add(right).add(below);
+            *d = forward.add(right).add(below);
         }
         let square = d[0].mul(d[0]).add(d[1].mul(d[1])).add(d[2].mul(d[2]));
         let unit = L::splat(1.0).div(square.sqrt());
         let (mut first, mut last) = (L::splat(1.0), L::splat(LAST_SAMPLE));
         let mut steps = d;
-        for axis in 0..3 {
-            let step = d[axis].mul(unit).mul(L::splat(view.scale[axis]));
-            steps[axis] = step;
+        for (axis, step) in steps.iter_mut().enumerate() {
+            *step = step.mul(unit).mul(L::splat(view.scale[axis]));
             let eye = L::splat(view.eye[axis]);
             let is_still = step.abs().lt(L::splat(SMALLEST_STEP));
-            let reciprocal = L::splat(1.0).div(step);
+            let reciprocal = L::splat(1.0).div(*step);
             let a = L::splat(view.low[axis]).sub(eye).mul(reciprocal);
             let b = L::splat(view.high[axis]).sub(eye).mul(reciprocal);
             let inside = (view.low[axis]..=view.high[axis]).contains(&view.eye[axis]);
@@ -152,15 +151,10 @@ impl<V: Voxel> TileKernel<'_, V> {
             termination,
             ..
         } = self.frame;
-        let [eye_x, eye_y, eye_z] = [0, 1, 2].map(|axis| view.eye[axis]);
-        let (eye_x, eye_y, eye_z) = (L::splat(eye_x), L::splat(eye_y), L::splat(eye_z));
+        let [eye_x, eye_y, eye_z] = splat_all::<N, L>(view.eye);
         let zero = L::splat(0.0);
         let one = L::splat(1.0);
-        let top = [
-            L::splat(view.last_voxel[0]),
-            L::splat(view.last_voxel[1]),
-            L::splat(view.last_voxel[2]),
-        ];
+        let top = splat_all::<N, L>(view.last_voxel);
         let dims = self.frame.volume.dims();
         // A single layer has no second one to interpolate with; it lies at distance 0 of itself.
         let stride = |axis: usize, stride: usize| if dims[axis] > 1 { stride as i32 } else { 0 };

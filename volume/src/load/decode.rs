@@ -180,7 +180,8 @@ mod tests {
                 let (result, warnings) = decoded(&bytes, count, VoxelType::$variant, endian);
                 let result = result.unwrap();
                 for (index, value) in values.iter().enumerate() {
-                    let got = f64::from(result.voxels.get(index)) + result.offset;
+                    let voxels = result.voxels.slice(result.voxels.len());
+                    let got = f64::from(voxels.get(index)) + result.offset;
                     assert_eq!(got, f64::from(*value), "{:?}", VoxelType::$variant);
                 }
                 assert_eq!(warnings, []);
