@@ -12,11 +12,13 @@
 //! | [`view`] | transfer functions and cameras of a file; a camera without one |
 //! | [`statistics`] | mean and percentiles |
 //! | [`cast`] | a picture of a volume |
+//! | [`estimate`] | how long rays will be, before they are cast |
 #![forbid(unsafe_code)]
 
 mod blocks;
 pub mod cast;
 mod distance;
+pub mod estimate;
 pub mod generate;
 pub mod grid;
 pub mod load;
@@ -29,6 +31,7 @@ mod voxels;
 
 pub use crate::{
     cast::{CastError, CastOptions, Picture, Raycaster, Skipping, Work},
+    estimate::{Estimate, EstimateMethod, Estimator},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},

@@ -163,6 +163,36 @@ impl TransferFunction {
         let (from, to) = (rgba(from), rgba(to));
         std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
     }
+
+    /// The mean opacity of the values between two, in either order; of equal ones, that of the value.
+    #[must_use]
+    pub fn mean_opacity(&self, a: f64, b: f64) -> f64 {
+        let (low, high) = (a.min(b), a.max(b));
+        if low == high {
+            return self.at(low)[3];
+        }
+        let mut sum = 0.0;
+        let mut add = |from: (f64, f64), to: (f64, f64)| {
+            // The part of a line from one point to another that lies within.
+            let (start, end) = (from.0.max(low), to.0.min(high));
+            if start < end {
+                let slope = (to.1 - from.1) / (to.0 - from.0);
+                let at = |value: f64| from.1 + slope * (value - from.0);
+                sum += (end - start) * 0.5 * (at(start) + at(end));
+            }
+        };
+        let place = |point: &ControlPoint| (f64::from(point.value), f64::from(point.opacity));
+        let (first, last) = (
+            place(&self.points[0]),
+            place(&self.points[self.points.len() - 1]),
+        );
+        add((low.min(first.0) - 1.0, first.1), first);
+        for pair in self.points.windows(2) {
+            add(place(&pair[0]), place(&pair[1]));
+        }
+        add(last, (high.max(last.0) + 1.0, last.1));
+        sum / (high - low)
+    }
 }
 
 #[cfg(test)]
@@ -227,6 +257,32 @@ mod tests {
             result,
             Err(TransferError::NotSorted { index: 1, .. })
         ));
+    }
+
+    #[test]
+    fn the_mean_opacity_is_that_of_many_values() {
+        let function = function(&[
+            [1.0, 0.0, 0.0, 0.0, 0.1],
+            [2.0, 0.0, 0.0, 0.0, 0.3],
+            [2.0, 0.0, 0.0, 0.0, 0.9],
+            [5.0, 0.0, 0.0, 0.0, 0.2],
+        ])
+        .unwrap();
+        for (a, b) in [
+            (0.0, 6.0),
+            (1.25, 1.75),
+            (6.0, 0.5),
+            (1.9, 2.1),
+            (-3.0, -2.0),
+            (7.0, 9.0),
+        ] {
+            let n = 40_000;
+            let at = |i: i32| function.at(a + (b - a) * (f64::from(i) + 0.5) / f64::from(n))[3];
+            let expected = (0..n).map(at).sum::<f64>() / f64::from(n);
+            let got = function.mean_opacity(a, b);
+            assert!((got - expected).abs() < 1e-4, "{a} {b}: {got} {expected}");
+        }
+        assert_eq!(function.mean_opacity(2.0, 2.0), f64::from(0.9_f32));
     }
 
     #[test]

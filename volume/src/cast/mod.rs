@@ -1,8 +1,8 @@
 //! Ray casting: pictures of volumes.
 
 mod kernel;
-mod reference;
-mod view;
+pub(crate) mod reference;
+pub(crate) mod view;
 
 use std::sync::Mutex;
 
@@ -52,7 +52,7 @@ impl Default for CastOptions {
 }
 
 impl CastOptions {
-    fn check(&self) -> Result<(), CastError> {
+    pub(crate) fn check(&self) -> Result<(), CastError> {
         if !(self.step > 0.0 && self.step.is_finite()) {
             return Err(CastError::Step { step: self.step });
         }
@@ -147,14 +147,14 @@ pub struct Picture {
 
 /// Distances in blocks.
 #[derive(Clone, Debug)]
-struct DistanceMap {
+pub(crate) struct DistanceMap {
     distances: Vec<u8>,
     dims: [usize; 3],
     shift: u32,
 }
 
 /// What all rays of a picture read.
-struct Frame<'a> {
+pub(crate) struct Frame<'a> {
     volume: &'a Volume,
     view: View,
     table: &'a TransferTable,

@@ -8,7 +8,7 @@ use crate::{grid::Volume, table::ENTRY};
 
 /// Casts the ray through the centre of a pixel.
 pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
-    let (step, first, last) = lattice(&frame.view, x, y);
+    let (step, first, last) = lattice(&frame.view, x as f32 + 0.5, y as f32 + 0.5);
     let mut ray = RayResult {
         colour: [0.0; 3],
         opacity: 0.0,
@@ -36,10 +36,10 @@ pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
     ray
 }
 
-/// The step of a ray in voxels, and its first and last sample.
-fn lattice(view: &View, x: u32, y: u32) -> ([f32; 3], f32, f32) {
-    let across = (x as f32 + 0.5) - view.centre[0];
-    let down = (y as f32 + 0.5) - view.centre[1];
+/// The step of the ray through a point of the picture, in voxels, and its first and last sample.
+pub(crate) fn lattice(view: &View, x: f32, y: f32) -> ([f32; 3], f32, f32) {
+    let across = x - view.centre[0];
+    let down = y - view.centre[1];
     let [forward, right, below] = view.frame;
     let d: [f32; 3] = std::array::from_fn(|i| forward[i] + right[i] * across + below[i] * down);
     let unit = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
