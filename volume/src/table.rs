@@ -14,6 +14,11 @@ use crate::{grid::Volume, transfer::TransferFunction};
 /// between them occur too.
 pub(crate) const DEFAULT_SIZE: usize = 1024;
 
+/// What is interpolated between values is outside them by at most this much of the larger magnitude:
+/// three interpolations, each a difference, a product and a sum, which are off by half an ulp of
+/// twice that magnitude.
+const ROUNDING: f32 = 16.0 * f32::EPSILON;
+
 /// Numbers of an entry: red, green, blue, opacity of a step.
 pub(crate) const ENTRY: usize = 4;
 
@@ -82,12 +87,16 @@ impl TransferTable {
         place.round_ties_even() as usize
     }
 
-    /// Whether nothing can be seen of raw values from `low` to `high`, even if a value between
-    /// them is computed as one that is just outside.
+    /// Whether nothing can be seen of what is interpolated from raw values from `low` to `high`,
+    /// rounding included. Of equal values the same is interpolated, without rounding.
     pub(crate) fn is_transparent(&self, low: f32, high: f32) -> bool {
-        let first = self.index(low).saturating_sub(1);
-        let end = (self.index(high) + 2).min(self.len());
-        self.lit_before[first] == self.lit_before[end]
+        let error = if low < high {
+            ROUNDING * low.abs().max(high.abs())
+        } else {
+            0.0
+        };
+        let (first, last) = (self.index(low - error), self.index(high + error));
+        self.lit_before[first] == self.lit_before[last + 1]
     }
 }
 
@@ -146,6 +155,11 @@ mod tests {
         ];
         let table = TransferTable::new(&function(&points), &volume(vec![0.0, 10.0]), 1.0, 1024);
         assert!(table.is_transparent(0.0, 2.48));
+        // Equal values are never interpolated to others.
+        let first_lit = (0..table.len()).find(|&i| table.opacity(i) > 0.0).unwrap();
+        let raw_of = |index: usize| index as f32 * 10.0 / 1023.0;
+        assert!(table.is_transparent(raw_of(first_lit - 1), raw_of(first_lit - 1)));
+        assert!(!table.is_transparent(raw_of(first_lit), raw_of(first_lit)));
         assert!(
             !table.is_transparent(0.0, 10.0),
             "a value that no voxel has"
