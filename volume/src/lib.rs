@@ -30,7 +30,7 @@ pub mod view;
 mod voxels;
 
 pub use crate::{
-    cast::{CastError, CastOptions, Picture, Raycaster, Skipping, Work},
+    cast::{Behind, CastError, CastOptions, Picture, Raycaster, Skipping, Work},
     estimate::{Estimate, EstimateMethod, Estimator},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},

@@ -11,8 +11,8 @@ use raywright::{
     bvh::Vec3,
     imaging::{Camera, Display, ToneCurve, write_image, write_png},
     volume::{
-        CastOptions, Picture, Raycaster, Skipping, Statistics, TransferFunction, View, Volume,
-        Work, presets,
+        Behind, CastOptions, Picture, Raycaster, Skipping, Statistics, TransferFunction, View,
+        Volume, Work, presets,
         view::{overview, read_transfer_function},
     },
 };
@@ -29,6 +29,14 @@ enum Skip {
     None,
     /// Jump by the distance to what can be seen
     Distance,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BehindEnd {
+    /// More of what was seen
+    TheSame,
+    /// Nothing, which darkens
+    Nothing,
 }
 
 #[derive(Debug, Args)]
@@ -63,6 +71,9 @@ pub(crate) struct RenderArgs {
     /// A ray ends when its opacity is above this; 1: never
     #[arg(long, default_value_t = 0.98)]
     termination: f32,
+    /// What is taken to be behind the point at which a ray ends
+    #[arg(long, value_enum, default_value_t = BehindEnd::TheSame)]
+    behind: BehindEnd,
     /// How empty space is left out; changes no pixel
     #[arg(long, value_enum, default_value_t = Skip::Distance)]
     skipping: Skip,
@@ -111,6 +122,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         options.step = args.step;
         options.termination = args.termination;
         options.isa = args.run.isa();
+        options.behind = match args.behind {
+            BehindEnd::TheSame => Behind::TheSame,
+            BehindEnd::Nothing => Behind::Nothing,
+        };
         options.skipping = match args.skipping {
             Skip::None => Skipping::None,
             Skip::Distance => Skipping::Distance,

@@ -34,6 +34,8 @@ pub struct CastOptions {
     pub step: f32,
     /// A ray ends when its opacity is above this; 1 or more: never.
     pub termination: f32,
+    /// What is taken to be behind the point at which a ray ends early.
+    pub behind: Behind,
     /// How empty space is left out. Changes no pixel.
     pub skipping: Skipping,
     /// The instruction set. Changes no pixel.
@@ -45,6 +47,7 @@ impl Default for CastOptions {
         Self {
             step: 1.0,
             termination: 0.98,
+            behind: Behind::TheSame,
             skipping: Skipping::Distance,
             isa: Isa::best(),
         }
@@ -63,6 +66,17 @@ impl CastOptions {
         }
         Ok(())
     }
+}
+
+/// What is taken to be behind the point at which a ray ends early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Behind {
+    /// More of what was seen: the colour is divided by the opacity. Most of the error of ending early
+    /// goes, save where colours change behind the end.
+    TheSame,
+    /// Nothing: pixels are darker by up to 1 less the threshold, as in the paper.
+    Nothing,
 }
 
 /// How empty space is left out.
@@ -250,14 +264,18 @@ impl<'a> Raycaster<'a> {
             Skipping::Distance => Some(self.distance_map(&table)),
         };
         let step = options.step * self.volume.unit_length();
-        let (results, work) = cast(&Frame {
+        let (mut results, work) = cast(&Frame {
             volume: self.volume,
             view: View::new(self.volume, &projection, step),
             table: &table,
             termination: options.termination,
             distances: map.as_ref(),
         });
-        for (pixel, result) in image.pixels_mut().iter_mut().zip(&results) {
+        for (pixel, result) in image.pixels_mut().iter_mut().zip(&mut results) {
+            if result.opacity > options.termination && options.behind == Behind::TheSame {
+                result.colour = result.colour.map(|c| c / result.opacity);
+                result.opacity = 1.0;
+            }
             *pixel = result.colour;
         }
         Ok(Picture {

@@ -225,3 +225,33 @@ fn a_constant_medium_is_as_opaque_as_its_length_says() {
         );
     }
 }
+
+#[test]
+fn what_is_hidden_is_taken_to_be_the_same() {
+    let volume = &volumes([20, 20, 20], [1.0; 3], 5)[0];
+    let caster = Raycaster::new(volume).unwrap();
+    let function = function(&[[0.0, 0.8, 0.4, 0.2, 0.3]]);
+    let camera = Camera::new(Vec3::splat(-30.0), Vec3::splat(9.5), Vec3::Z, 40.0).unwrap();
+    let render = |termination, behind| {
+        let options = CastOptions {
+            termination,
+            behind,
+            ..CastOptions::default()
+        };
+        caster
+            .render(&function, &camera, [16, 16], &options)
+            .unwrap()
+    };
+    let exact = render(1.0, Behind::Nothing);
+    let errors = |behind| {
+        let picture = render(0.9, behind);
+        let pixels = picture.image.pixels().iter().zip(exact.image.pixels());
+        let errors: Vec<f32> = pixels.map(|(a, b)| (a[0] - b[0]).abs()).collect();
+        let mean = errors.iter().sum::<f32>() / errors.len() as f32;
+        (errors.into_iter().fold(0.0, f32::max), mean)
+    };
+    let [(most, mean), (most_dark, mean_dark)] = [Behind::TheSame, Behind::Nothing].map(errors);
+    // Never more than what a ray of the threshold's opacity lacks, in red.
+    assert!(most.max(most_dark) <= 0.08 + 1e-6, "{most} {most_dark}");
+    assert!(mean < 0.3 * mean_dark, "{mean} {mean_dark}");
+}
