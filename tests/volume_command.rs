@@ -243,6 +243,8 @@ fn what_cannot_be_rendered_says_what_may_be_tried() {
         ("--step 0", "above 0", ""),
         ("--termination nan", "termination", ""),
         ("--width 0", "0", ""),
+        ("--clip 1,2,3", "no clip box", "two corners"),
+        ("--clip nan,0,0,1,1,1", "must be numbers", ""),
     ] {
         let line = format!("volume render nebula --dims 8,8,8 {args}");
         let output = raywright(folder.path(), &line.split(' ').collect::<Vec<_>>());

@@ -8,7 +8,7 @@ use std::{
 
 use clap::{Args, ValueEnum};
 use raywright::{
-    bvh::Vec3,
+    bvh::{Aabb, Vec3},
     imaging::{Camera, Display, ToneCurve, write_image, write_png},
     volume::{
         Behind, CastOptions, Picture, Raycaster, Skipping, Statistics, TransferFunction, View,
@@ -74,6 +74,9 @@ pub(crate) struct RenderArgs {
     /// What is taken to be behind the point at which a ray ends
     #[arg(long, value_enum, default_value_t = BehindEnd::TheSame)]
     behind: BehindEnd,
+    /// Show only what is between two corners, in units of the spacing
+    #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
+    clip: Option<String>,
     /// How empty space is left out; changes no pixel
     #[arg(long, value_enum, default_value_t = Skip::Distance)]
     skipping: Skip,
@@ -126,6 +129,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             BehindEnd::TheSame => Behind::TheSame,
             BehindEnd::Nothing => Behind::Nothing,
         };
+        options.clip = args.clip.as_deref().map(clip_box).transpose()?;
         options.skipping = match args.skipping {
             Skip::None => Skipping::None,
             Skip::Distance => Skipping::Distance,
@@ -189,6 +193,22 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         } else {
             Ok(())
         }
+    })
+}
+
+/// The box of six numbers.
+fn clip_box(text: &str) -> Result<Aabb, Failure> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let numbers = <[f32; 6]>::try_from(numbers.unwrap_or_default());
+    let [a, b, c, d, e, f] = numbers.map_err(|_| {
+        Failure::with_hint(
+            anyhow::anyhow!("{text} is no clip box"),
+            "give two corners, as in 0,0,0,100,100,50",
+        )
+    })?;
+    Ok(Aabb {
+        min: Vec3::new(a, b, c),
+        max: Vec3::new(d, e, f),
     })
 }
 

@@ -11,10 +11,7 @@
 
 use raywright_bvh::simd::{GatherLanes, LaneKernel, splat_all};
 
-use super::{
-    Frame, RayResult, Work,
-    view::{LAST_SAMPLE, SMALLEST_STEP},
-};
+use super::{Frame, RayResult, Work, view::SMALLEST_STEP};
 use crate::table::ENTRY;
 
 /// Most lanes of any instruction set.
@@ -125,7 +122,7 @@ impl<V: Voxel> TileKernel<'_, V> {
         }
         let square = d[0].mul(d[0]).add(d[1].mul(d[1])).add(d[2].mul(d[2]));
         let unit = L::splat(1.0).div(square.sqrt());
-        let (mut first, mut last) = (L::splat(1.0), L::splat(LAST_SAMPLE));
+        let (mut first, mut last) = (L::splat(1.0), L::splat(view.last_sample));
         let mut steps = d;
         for (axis, step) in steps.iter_mut().enumerate() {
             *step = step.mul(unit).mul(L::splat(view.scale[axis]));
@@ -135,7 +132,7 @@ impl<V: Voxel> TileKernel<'_, V> {
             let a = L::splat(view.low[axis]).sub(eye).mul(reciprocal);
             let b = L::splat(view.high[axis]).sub(eye).mul(reciprocal);
             let inside = (view.low[axis]..=view.high[axis]).contains(&view.eye[axis]);
-            let still_last = L::splat(if inside { LAST_SAMPLE } else { -1.0 });
+            let still_last = L::splat(if inside { view.last_sample } else { -1.0 });
             first = first.max(L::select(is_still, L::splat(1.0), a.min(b)));
             last = last.min(L::select(is_still, still_last, a.max(b)));
         }

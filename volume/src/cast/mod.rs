@@ -7,7 +7,7 @@ pub(crate) mod view;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
-use raywright_bvh::Isa;
+use raywright_bvh::{Aabb, Isa, Vec3};
 use raywright_imaging::{Camera, CameraError, FilmError, Image};
 
 use crate::{
@@ -36,6 +36,9 @@ pub struct CastOptions {
     pub termination: f32,
     /// What is taken to be behind the point at which a ray ends early.
     pub behind: Behind,
+    /// The box outside which nothing is seen, world units; `None` for the whole volume. It moves no
+    /// sample. An inverted box contains nothing.
+    pub clip: Option<Aabb>,
     /// How empty space is left out. Changes no pixel.
     pub skipping: Skipping,
     /// The instruction set. Changes no pixel.
@@ -48,6 +51,7 @@ impl Default for CastOptions {
             step: 1.0,
             termination: 0.98,
             behind: Behind::TheSame,
+            clip: None,
             skipping: Skipping::Distance,
             isa: Isa::best(),
         }
@@ -62,6 +66,14 @@ impl CastOptions {
         if self.termination.is_nan() || self.termination < 0.0 {
             return Err(CastError::Termination {
                 termination: self.termination,
+            });
+        }
+        if let Some(clip) = &self.clip
+            && (clip.min.is_nan() || clip.max.is_nan())
+        {
+            return Err(CastError::Clip {
+                min: clip.min,
+                max: clip.max,
             });
         }
         Ok(())
@@ -110,6 +122,14 @@ pub enum CastError {
     Termination {
         /// The threshold.
         termination: f32,
+    },
+    /// A corner of the clip box is not a number.
+    #[error("a clip box from {min} to {max}: its corners must be numbers")]
+    Clip {
+        /// Its lower corner.
+        min: Vec3,
+        /// Its upper corner.
+        max: Vec3,
     },
     /// The volume has more voxels than lanes can index.
     #[error("{voxels} voxels are more than the {limit} that can be indexed")]
@@ -266,7 +286,7 @@ impl<'a> Raycaster<'a> {
         let step = options.step * self.volume.unit_length();
         let (mut results, work) = cast(&Frame {
             volume: self.volume,
-            view: View::new(self.volume, &projection, step),
+            view: View::new(self.volume, &projection, step, options.clip.as_ref()),
             table: &table,
             termination: options.termination,
             distances: map.as_ref(),

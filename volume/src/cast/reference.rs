@@ -2,7 +2,7 @@
 
 use super::{
     Frame, RayResult,
-    view::{LAST_SAMPLE, SMALLEST_STEP, View},
+    view::{SMALLEST_STEP, View},
 };
 use crate::{grid::Volume, table::ENTRY};
 
@@ -44,7 +44,7 @@ pub(crate) fn lattice(view: &View, x: f32, y: f32) -> ([f32; 3], f32, f32) {
     let d: [f32; 3] = std::array::from_fn(|i| forward[i] + right[i] * across + below[i] * down);
     let unit = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
     let step = std::array::from_fn(|axis| d[axis] * unit * view.scale[axis]);
-    let (mut first, mut last) = (1.0_f32, LAST_SAMPLE);
+    let (mut first, mut last) = (1.0_f32, view.last_sample);
     for axis in 0..3 {
         let (eye, step): (f32, f32) = (view.eye[axis], step[axis]);
         if step.abs() < SMALLEST_STEP {

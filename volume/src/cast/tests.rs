@@ -255,3 +255,61 @@ fn what_is_hidden_is_taken_to_be_the_same() {
     assert!(most.max(most_dark) <= 0.08 + 1e-6, "{most} {most_dark}");
     assert!(mean < 0.3 * mean_dark, "{mean} {mean_dark}");
 }
+
+#[test]
+fn a_clip_box_takes_samples_away_and_moves_none() {
+    let volume = &volumes([20, 17, 31], [1.0, 1.5, 0.7], 3)[1];
+    let extent = volume.extent();
+    let camera = Camera::new(
+        extent * 0.5 + Vec3::new(50.0, -30.0, 20.0),
+        extent * 0.5,
+        Vec3::Z,
+        40.0,
+    )
+    .unwrap();
+    let caster = Raycaster::new(volume).unwrap();
+    let function = &functions(volume)[1];
+    let render = |clip: Option<(Vec3, Vec3)>, isa| {
+        let clip = clip.map(|(min, max)| Aabb { min, max });
+        let options = CastOptions {
+            clip,
+            isa,
+            ..CastOptions::default()
+        };
+        let picture = caster
+            .render(function, &camera, [40, 40], &options)
+            .unwrap();
+        let slow = caster
+            .render_slowly(function, &camera, [40, 40], &options)
+            .unwrap();
+        assert_eq!((&picture.image, &picture.end), (&slow.image, &slow.end));
+        picture
+    };
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let whole = render(None, isa);
+        let around = render(Some((Vec3::splat(-9.0), extent + 9.0)), isa);
+        assert_eq!(around, whole);
+        let half = render(Some((Vec3::ZERO, extent * Vec3::new(1.0, 0.5, 1.0))), isa);
+        assert!(half.work.samples < whole.work.samples * 2 / 3);
+        // What a ray meets first is seen the same if it is inside.
+        let same = half.image.pixels().iter().zip(whole.image.pixels());
+        assert!(same.filter(|(a, b)| a == b && a[0] > 0.0).count() > 20);
+        let nothing = render(Some((extent, Vec3::ZERO)), isa);
+        assert_eq!(
+            (nothing.work, nothing.opacity.iter().sum::<f32>()),
+            (Work::default(), 0.0)
+        );
+    }
+    let clip = Some(Aabb {
+        min: Vec3::NAN,
+        max: extent,
+    });
+    let options = CastOptions {
+        clip,
+        ..CastOptions::default()
+    };
+    let error = caster
+        .render(function, &camera, [4, 4], &options)
+        .unwrap_err();
+    assert!(matches!(error, CastError::Clip { .. }));
+}

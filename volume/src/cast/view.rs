@@ -5,6 +5,7 @@
 //!
 //! Invariant: the position of sample k is `k · step + eye`, two roundings in f32, in every kernel.
 
+use raywright_bvh::Aabb;
 use raywright_imaging::Projection;
 
 use crate::grid::Volume;
@@ -23,6 +24,8 @@ pub(crate) struct View {
     /// The box in which there are samples, in voxels.
     pub(crate) low: [f32; 3],
     pub(crate) high: [f32; 3],
+    /// No sample has a larger number.
+    pub(crate) last_sample: f32,
     /// The last voxel; samples beyond are moved onto it.
     pub(crate) last_voxel: [f32; 3],
     /// More than any position of a sample in the box is off by, in voxels.
@@ -30,8 +33,14 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Rays of `projection` with a sample every `step` world units.
-    pub(crate) fn new(volume: &Volume, projection: &Projection, step: f32) -> Self {
+    /// Rays of `projection` with a sample every `step` world units, inside `clip` alone if there is
+    /// such a box in world units.
+    pub(crate) fn new(
+        volume: &Volume,
+        projection: &Projection,
+        step: f32,
+        clip: Option<&Aabb>,
+    ) -> Self {
         let (dims, spacing) = (volume.dims(), volume.spacing());
         let origin = projection.origin().to_array();
         let last_voxel = dims.map(|n| (n - 1) as f32);
@@ -43,13 +52,23 @@ impl View {
         let eye = per_axis(|o, s| (f64::from(o) / f64::from(s)) as f32, origin);
         let farthest = |axis: usize| eye[axis].abs() + last_voxel[axis];
         let farthest = farthest(0).max(farthest(1)).max(farthest(2));
+        let low: [f32; 3] = std::array::from_fn(|axis| {
+            let low: f32 = if is_thin[axis] { -0.5 } else { 0.0 };
+            clip.map_or(low, |clip| low.max(clip.min[axis] / spacing[axis]))
+        });
+        let high: [f32; 3] = std::array::from_fn(|axis| {
+            let high = if is_thin[axis] { 0.5 } else { last_voxel[axis] };
+            clip.map_or(high, |clip| high.min(clip.max[axis] / spacing[axis]))
+        });
+        let is_empty = (0..3).any(|axis| low[axis] > high[axis]);
         Self {
             eye,
             frame: projection.frame().map(|v| v.to_array()),
             centre: projection.centre(),
             scale: per_axis(|step, s| step / s, [step; 3]),
-            low: is_thin.map(|thin| if thin { -0.5 } else { 0.0 }),
-            high: std::array::from_fn(|axis| if is_thin[axis] { 0.5 } else { last_voxel[axis] }),
+            low,
+            high,
+            last_sample: if is_empty { -1.0 } else { LAST_SAMPLE },
             last_voxel,
             border: (1.0 / 64.0_f32).max(4.0 * f32::EPSILON * farthest),
         }
@@ -57,7 +76,7 @@ impl View {
 }
 
 /// Largest number of a sample: above, floats do not hold every integer.
-pub(crate) const LAST_SAMPLE: f32 = (1 << 24) as f32;
+const LAST_SAMPLE: f32 = (1 << 24) as f32;
 
 /// Components of a step below this are taken for 0: their reciprocal might be infinite.
 pub(crate) const SMALLEST_STEP: f32 = 1e-30;

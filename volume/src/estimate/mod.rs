@@ -157,7 +157,7 @@ impl<'a> Estimator<'a> {
         };
         let step = options.step * self.volume.unit_length();
         let march = March {
-            view: View::new(self.volume, &projection, step),
+            view: View::new(self.volume, &projection, step, options.clip.as_ref()),
             dims: self.blocks.dims,
             lit: &lit,
             medium: &medium,
