@@ -41,7 +41,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
     Demo(demo::DemoArgs),
-    /// Volumes: what is in a file
+    /// Volumes: what is in a file, and pictures of it
     #[command(subcommand)]
     Volume(volume::VolumeCommand),
 }

@@ -1,6 +1,6 @@
 //! Rays in lanes. Each lane follows a ray of its own at its own pace: it skips what is empty, samples
-//! what is not, and when enough lanes are done, the next rays of the tile take their places. So no
-//! lane waits for its neighbours, however long their ways are.
+//! what is not, and when enough lanes are done, the next rays of the tile take their places. So a
+//! short ray does not wait for the end of long ones beside it.
 //!
 //! Empty space: Zuiderveld, Koning, Viergever, *Acceleration of Ray-Casting Using 3-D Distance
 //! Transforms*, 1992, on blocks. Front-to-back compositing with early ray termination: Levoy,
@@ -13,9 +13,6 @@ use raywright_bvh::simd::{GatherLanes, LaneKernel, splat_all};
 
 use super::{Frame, RayResult, Work, view::SMALLEST_STEP};
 use crate::table::ENTRY;
-
-/// Most lanes of any instruction set.
-const MOST_LANES: usize = 16;
 
 /// So many samples are taken before the distance map is asked again, which costs as much as a
 /// quarter of a sample: a few samples too many, and 8 to 16 % less time than asking each time.
@@ -45,7 +42,7 @@ voxel!(u8, gather_pairs_u8);
 voxel!(u16, gather_pairs_u16);
 voxel!(f32, gather_pairs_f32);
 
-/// A ray that waits for a lane, or its state in one.
+/// A ray that waits for a lane.
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     step: [f32; 3],
@@ -203,8 +200,7 @@ impl<V: Voxel> TileKernel<'_, V> {
             let step_x = L::load(&lanes.step[0]);
             let step_y = L::load(&lanes.step[1]);
             let step_z = L::load(&lanes.step[2]);
-            let last_given = L::load(&lanes.last);
-            let mut last = last_given;
+            let mut last = L::load(&lanes.last);
             let mut k = L::load(&lanes.k);
             let mut r = L::load(&lanes.colour[0]);
             let mut g = L::load(&lanes.colour[1]);
@@ -403,7 +399,6 @@ struct LaneStates<const N: usize> {
 impl<const N: usize> LaneStates<N> {
     #[inline(always)]
     fn idle() -> Self {
-        const { assert!(N <= MOST_LANES) };
         Self {
             step: [[1.0; N]; 3],
             k: [0.0; N],

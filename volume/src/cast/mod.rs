@@ -147,7 +147,7 @@ pub enum CastError {
 pub struct Work {
     /// Rays that meet the box of the volume.
     pub rays: u64,
-    /// Samples that were interpolated.
+    /// Samples that were interpolated, some of them a little beyond what can be seen.
     pub samples: u64,
     /// Samples of which something is seen.
     pub lit_samples: u64,
