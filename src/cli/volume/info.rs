@@ -91,6 +91,7 @@ impl Report {
             volume,
             source,
             notes,
+            ..
         } = stage;
         let voxels = volume.voxels();
         let source = source.as_ref();

@@ -43,7 +43,7 @@ enum BehindEnd {
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     volume: VolumeOptions,
-    /// Transfer function: a name in VOLUME.view.json, a file of points, or a preset (ramp, fire, soft-tissue, bone, surface); by default the first of the view file, or ramp
+    /// Transfer function: a name in VOLUME.view.json, a file of points, or a preset (ramp, fire, soft-tissue, bone, surface); by default the first of the view file, `own` of a generated volume, or ramp
     #[arg(long, value_name = "NAME|FILE")]
     tf: Option<String>,
     /// Camera: a name in VOLUME.view.json, or nine numbers: position, target, up; by default the whole volume
@@ -118,7 +118,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let cancel = cancel_on_interrupt()?;
     args.run.install(|| {
         let stage = args.volume.prepare()?;
-        let view = view_of(&args.volume.volume)?;
+        let view = match &stage.view {
+            Some(view) => Some(view.clone()),
+            None => view_of(&args.volume.volume)?,
+        };
         let (tf_name, function) = transfer_function(args, &stage.volume, view.as_ref())?;
         let (camera_name, camera) = camera(args, &stage.volume, view.as_ref())?;
         let mut options = CastOptions::default();

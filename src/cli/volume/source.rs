@@ -4,7 +4,7 @@ use std::{path::Path, str::FromStr};
 
 use clap::Args;
 use raywright::volume::{
-    Generated, Volume, generate,
+    Generated, View, Volume, generate,
     load::{
         CompanionFiles, Endian, LoadError, LoadOptions, MissingValues, RawLayout, SourceFacts,
         VoxelType, load_volume,
@@ -53,6 +53,8 @@ pub(crate) struct VolumeStage {
     pub(crate) volume: Volume,
     /// How the file stores it; `None` if it was generated.
     pub(crate) source: Option<SourceFacts>,
+    /// The view that was generated with it.
+    pub(crate) view: Option<View>,
     /// What the user should know about it.
     pub(crate) notes: Vec<String>,
 }
@@ -62,10 +64,20 @@ impl VolumeOptions {
     pub(crate) fn prepare(&self) -> Result<VolumeStage, Failure> {
         let path = Path::new(&self.volume);
         if generate::NAMES.contains(&self.volume.as_str()) && !path.exists() {
-            let Generated { volume, .. } = self.generate()?;
+            let Generated {
+                volume,
+                transfer_function,
+                camera,
+                ..
+            } = self.generate()?;
+            let mut view = View::default();
+            view.transfer_functions
+                .insert("own".into(), transfer_function);
+            view.cameras.insert("overview".into(), camera);
             return Ok(VolumeStage {
                 volume,
                 source: None,
+                view: Some(view),
                 notes: Vec::new(),
             });
         }
@@ -88,6 +100,7 @@ impl VolumeOptions {
         Ok(VolumeStage {
             volume: loaded.volume,
             source: Some(loaded.source),
+            view: None,
             notes,
         })
     }
