@@ -6,8 +6,34 @@
 //! for this distance: Rosenfeld, Pfaltz, *Sequential Operations in Digital Picture Processing*,
 //! 1966.
 
+use crate::{blocks::Blocks, table::TransferTable};
+
+/// The distances of the blocks of a volume.
+#[derive(Clone, Debug)]
+pub(crate) struct DistanceMap {
+    /// In blocks, and three items more: words of four bytes are read.
+    pub(crate) distances: Vec<u8>,
+    /// Blocks along x, y, z.
+    pub(crate) dims: [usize; 3],
+    /// Binary logarithm of the cells along the edge of a block.
+    pub(crate) shift: u32,
+}
+
+impl DistanceMap {
+    /// What `table` shows of the blocks.
+    pub(crate) fn new(blocks: &Blocks, table: &TransferTable) -> Self {
+        let mut distances = distances(&blocks.lit(table), blocks.dims);
+        distances.extend([0; 3]);
+        Self {
+            distances,
+            dims: blocks.dims,
+            shift: blocks.shift,
+        }
+    }
+}
+
 /// The distance of every block, 0 for lit ones, at most 255.
-pub(crate) fn distances(lit: &[bool], [across, down, layers]: [usize; 3]) -> Vec<u8> {
+fn distances(lit: &[bool], [across, down, layers]: [usize; 3]) -> Vec<u8> {
     let mut distances: Vec<u8> = lit
         .iter()
         .map(|&lit| if lit { 0 } else { u8::MAX })

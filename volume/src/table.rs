@@ -19,14 +19,16 @@ pub(crate) const DEFAULT_SIZE: usize = 1024;
 /// twice that magnitude.
 const ROUNDING: f32 = 16.0 * f32::EPSILON;
 
-/// Numbers of an entry: red, green, blue, opacity of a step.
-pub(crate) const ENTRY: usize = 4;
+/// A colour of 1 in a table. Colours have 16 bits, so that lanes fetch all three at once.
+pub(crate) const FULL_COLOUR: f32 = 65535.0;
 
 /// A baked transfer function.
 #[derive(Clone, Debug)]
 pub(crate) struct TransferTable {
-    /// [`ENTRY`] numbers for each entry.
-    pub(crate) entries: Vec<f32>,
+    /// The opacity of a step at each entry.
+    pub(crate) opacities: Vec<f32>,
+    /// Red, green, blue at each entry in units of 1 / [`FULL_COLOUR`], and 0.
+    pub(crate) colours: Vec<[u16; 4]>,
     /// index = raw · scale + offset, limited and rounded.
     pub(crate) scale: f32,
     pub(crate) offset: f32,
@@ -49,7 +51,8 @@ impl TransferTable {
         let [low, high] = [low, high].map(f64::from);
         let [slope, intercept] = [volume.scale().slope, volume.scale().intercept].map(f64::from);
         let mut table = Self {
-            entries: Vec::with_capacity(size * ENTRY),
+            opacities: Vec::with_capacity(size),
+            colours: Vec::with_capacity(size),
             scale,
             offset: -volume.raw_range()[0] * scale,
             lit_before: Vec::with_capacity(size + 1),
@@ -59,22 +62,14 @@ impl TransferTable {
             let raw = low + (high - low) * index as f64 / f64::from(last);
             let [r, g, b, opacity] = function.at(raw * slope + intercept);
             let of_step = -(f64::from(step) * (-opacity).ln_1p()).exp_m1();
-            table.entries.extend([r, g, b, of_step].map(|v| v as f32));
+            let colour = |of: f64| (of * f64::from(FULL_COLOUR)).round() as u16;
+            table.opacities.push(of_step as f32);
+            table.colours.push([colour(r), colour(g), colour(b), 0]);
             table.lit_before.push(lit);
-            lit += u32::from(table.opacity(index) > 0.0);
+            lit += u32::from(table.opacities[index] > 0.0);
         }
         table.lit_before.push(lit);
         table
-    }
-
-    /// How many entries there are.
-    pub(crate) fn len(&self) -> usize {
-        self.lit_before.len() - 1
-    }
-
-    /// The opacity of a step at an entry.
-    pub(crate) fn opacity(&self, index: usize) -> f32 {
-        self.entries[index * ENTRY + 3]
     }
 
     /// The entry of a raw value; NaN has the first.
@@ -82,7 +77,7 @@ impl TransferTable {
         let place = raw * self.scale + self.offset;
         // As lanes do it: NaN becomes the second operand.
         let place = if place > 0.0 { place } else { 0.0 };
-        let last = (self.len() - 1) as f32;
+        let last = (self.opacities.len() - 1) as f32;
         let place = if place < last { place } else { last };
         place.round_ties_even() as usize
     }
@@ -127,9 +122,9 @@ mod tests {
         for step in [0.125, 0.5, 1.0, 3.0] {
             let table = TransferTable::new(&function, &volume(vec![0.5, 5.0]), step, 256);
             let expected = 1.0 - 0.7_f64.powf(f64::from(step));
-            assert!((f64::from(table.opacity(0)) - expected).abs() < 1e-7);
-            assert_eq!(table.opacity(255), 1.0, "opaque stays opaque");
-            assert_eq!(table.entries[..3], [1.0, 0.5, 0.25]);
+            assert!((f64::from(table.opacities[0]) - expected).abs() < 1e-7);
+            assert_eq!(table.opacities[255], 1.0, "opaque stays opaque");
+            assert_eq!(table.colours[0], [65535, 32768, 16384, 0]);
         }
     }
 
@@ -138,9 +133,9 @@ mod tests {
         let function = function(&[[0.0, 1.0, 1.0, 1.0, 1e-7]]);
         let table = TransferTable::new(&function, &volume(vec![0.0, 1.0]), 0.25, 16);
         assert!(
-            (table.opacity(3) / 2.5e-8 - 1.0).abs() < 1e-5,
+            (table.opacities[3] / 2.5e-8 - 1.0).abs() < 1e-5,
             "{}",
-            table.opacity(3)
+            table.opacities[3]
         );
     }
 
@@ -156,7 +151,11 @@ mod tests {
         let table = TransferTable::new(&function(&points), &volume(vec![0.0, 10.0]), 1.0, 1024);
         assert!(table.is_transparent(0.0, 2.48));
         // Equal values are never interpolated to others.
-        let first_lit = (0..table.len()).find(|&i| table.opacity(i) > 0.0).unwrap();
+        let first_lit = table
+            .opacities
+            .iter()
+            .position(|&opacity| opacity > 0.0)
+            .unwrap();
         let raw_of = |index: usize| index as f32 * 10.0 / 1023.0;
         assert!(table.is_transparent(raw_of(first_lit - 1), raw_of(first_lit - 1)));
         assert!(!table.is_transparent(raw_of(first_lit), raw_of(first_lit)));

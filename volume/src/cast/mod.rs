@@ -1,7 +1,10 @@
 //! Ray casting: pictures of volumes.
 
+mod field;
 mod kernel;
+mod lanes;
 pub(crate) mod reference;
+mod space;
 pub(crate) mod view;
 
 use std::sync::Mutex;
@@ -12,11 +15,12 @@ use raywright_imaging::{Camera, CameraError, FilmError, Image};
 
 use crate::{
     blocks::Blocks,
-    distance::distances,
-    grid::{Volume, Voxels},
-    table::{DEFAULT_SIZE, TransferTable},
+    distance::DistanceMap,
+    grid::Volume,
+    table::{DEFAULT_SIZE, FULL_COLOUR, TransferTable},
     transfer::TransferFunction,
 };
+use field::Layout;
 use kernel::TileKernel;
 use view::View;
 
@@ -179,17 +183,10 @@ pub struct Picture {
     pub work: Work,
 }
 
-/// Distances in blocks.
-#[derive(Clone, Debug)]
-pub(crate) struct DistanceMap {
-    distances: Vec<u8>,
-    dims: [usize; 3],
-    shift: u32,
-}
-
 /// What all rays of a picture read.
 pub(crate) struct Frame<'a> {
     volume: &'a Volume,
+    layout: &'a Layout<'a>,
     view: View,
     table: &'a TransferTable,
     termination: f32,
@@ -199,7 +196,7 @@ pub(crate) struct Frame<'a> {
 /// What a ray found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RayResult {
-    /// Colour, multiplied by opacity.
+    /// Colour, multiplied by opacity, in units of the table.
     pub(crate) colour: [f32; 3],
     pub(crate) opacity: f32,
     /// Number of the sample behind the last that was looked at; 0 if there was none.
@@ -210,6 +207,7 @@ pub(crate) struct RayResult {
 #[derive(Clone, Debug)]
 pub struct Raycaster<'a> {
     volume: &'a Volume,
+    layout: Layout<'a>,
     blocks: Blocks,
 }
 
@@ -228,6 +226,7 @@ impl<'a> Raycaster<'a> {
         }
         Ok(Self {
             volume,
+            layout: Layout::of(volume),
             blocks: Blocks::new(volume, BLOCK_SHIFT),
         })
     }
@@ -281,22 +280,24 @@ impl<'a> Raycaster<'a> {
         let table = TransferTable::new(function, self.volume, options.step, DEFAULT_SIZE);
         let map = match options.skipping {
             Skipping::None => None,
-            Skipping::Distance => Some(self.distance_map(&table)),
+            Skipping::Distance => Some(DistanceMap::new(&self.blocks, &table)),
         };
         let step = options.step * self.volume.unit_length();
         let (mut results, work) = cast(&Frame {
             volume: self.volume,
+            layout: &self.layout,
             view: View::new(self.volume, &projection, step, options.clip.as_ref()),
             table: &table,
             termination: options.termination,
             distances: map.as_ref(),
         });
         for (pixel, result) in image.pixels_mut().iter_mut().zip(&mut results) {
+            let mut full = FULL_COLOUR;
             if result.opacity > options.termination && options.behind == Behind::TheSame {
-                result.colour = result.colour.map(|c| c / result.opacity);
+                full *= result.opacity;
                 result.opacity = 1.0;
             }
-            *pixel = result.colour;
+            *pixel = result.colour.map(|c| c / full);
         }
         Ok(Picture {
             image,
@@ -304,18 +305,6 @@ impl<'a> Raycaster<'a> {
             end: results.iter().map(|r| r.end).collect(),
             work,
         })
-    }
-
-    fn distance_map(&self, table: &TransferTable) -> DistanceMap {
-        let dims = self.blocks.dims;
-        let mut distances = distances(&self.blocks.lit(table), dims);
-        // Words of four bytes are read.
-        distances.extend([0; 3]);
-        DistanceMap {
-            distances,
-            dims,
-            shift: self.blocks.shift,
-        }
     }
 }
 
@@ -385,10 +374,10 @@ fn cast_tile(
             )
         };
     }
-    match frame.volume.padded() {
-        Voxels::U8(voxels) => run!(voxels),
-        Voxels::U16(voxels) => run!(voxels),
-        Voxels::F32(voxels) => run!(voxels),
+    match frame.layout {
+        Layout::U8(voxels) => run!(&voxels[..]),
+        Layout::U16(voxels) => run!(&voxels[..]),
+        Layout::F32(voxels) => run!(*voxels),
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     Frame, RayResult,
     view::{SMALLEST_STEP, View},
 };
-use crate::{grid::Volume, table::ENTRY};
+use crate::grid::Volume;
 
 /// Casts the ray through the centre of a pixel.
 pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
@@ -23,10 +23,10 @@ pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
         if raw.is_nan() {
             continue;
         }
-        let entry = &frame.table.entries[frame.table.index(raw) * ENTRY..][..ENTRY];
-        let weight = (1.0 - ray.opacity) * entry[3];
-        for (sum, colour) in ray.colour.iter_mut().zip(entry) {
-            *sum += weight * colour;
+        let entry = frame.table.index(raw);
+        let weight = (1.0 - ray.opacity) * frame.table.opacities[entry];
+        for (sum, &colour) in ray.colour.iter_mut().zip(&frame.table.colours[entry]) {
+            *sum += weight * f32::from(colour);
         }
         ray.opacity += weight;
         if ray.opacity > frame.termination {
