@@ -4,7 +4,10 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::{grid::ValueScale, transfer::ControlPoint};
+use crate::{
+    grid::{ValueScale, Voxels},
+    transfer::ControlPoint,
+};
 
 fn function(points: &[[f32; 5]]) -> TransferFunction {
     let points: Vec<ControlPoint> = points.iter().map(|&p| p.into()).collect();
