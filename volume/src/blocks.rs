@@ -10,42 +10,65 @@ use rayon::prelude::*;
 
 use crate::{
     grid::{Volume, Voxels},
-    table::TransferTable,
+    table::{BakedFunction, TableIndex},
 };
 
-/// The bounds of all blocks of a volume.
+/// The blocks of a volume, by what can be looked up in them.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks {
     /// Binary logarithm of the cells along an edge.
     pub(crate) shift: u32,
     /// Blocks along x, y, z.
     pub(crate) dims: [usize; 3],
-    /// Smallest and largest raw value, x fastest; +∞ and −∞ where all are missing.
-    bounds: Vec<[f32; 2]>,
+    index: TableIndex,
+    /// First and last entry that samples can have, x fastest; none where all voxels are missing.
+    entries: Vec<[u16; 2]>,
 }
 
 impl Blocks {
-    /// Blocks of 2^`shift` cells along each edge.
-    pub(crate) fn new(volume: &Volume, shift: u32) -> Self {
-        let dims = volume.dims().map(|n| (n - 1).max(1).div_ceil(1 << shift));
-        let bounds = match volume.padded() {
-            Voxels::U8(values) => bounds_of(values, volume.dims(), dims, shift),
-            Voxels::U16(values) => bounds_of(values, volume.dims(), dims, shift),
-            Voxels::F32(values) => bounds_of(values, volume.dims(), dims, shift),
+    /// Blocks of 2^`shift` cells along each edge, for tables with this index.
+    pub(crate) fn new(volume: &Volume, shift: u32, index: TableIndex) -> Self {
+        let (dims, bounds) = bounds(volume, shift);
+        let entries = |&[low, high]: &[f32; 2]| {
+            if low <= high {
+                index.range(low, high)
+            } else {
+                NO_ENTRIES
+            }
         };
         Self {
             shift,
             dims,
-            bounds,
+            index,
+            entries: bounds.par_iter().map(entries).collect(),
         }
     }
 
     /// For each block, whether something can be seen in it.
-    pub(crate) fn lit(&self, table: &TransferTable) -> Vec<bool> {
-        let lit = |&[low, high]: &[f32; 2]| low <= high && !table.is_transparent(low, high);
-        self.bounds.iter().map(lit).collect()
+    pub(crate) fn lit<'a>(
+        &'a self,
+        function: &'a BakedFunction,
+    ) -> impl Iterator<Item = bool> + 'a {
+        debug_assert_eq!(self.index, function.index(), "another table");
+        self.entries
+            .iter()
+            .map(|&range| !function.is_transparent(range))
     }
 }
+
+/// Blocks along x, y, z, and their smallest and largest raw values; +∞ and −∞ where all are missing.
+fn bounds(volume: &Volume, shift: u32) -> ([usize; 3], Vec<[f32; 2]>) {
+    let dims = volume.dims().map(|n| (n - 1).max(1).div_ceil(1 << shift));
+    let bounds = match volume.padded() {
+        Voxels::U8(values) => bounds_of(values, volume.dims(), dims, shift),
+        Voxels::U16(values) => bounds_of(values, volume.dims(), dims, shift),
+        Voxels::F32(values) => bounds_of(values, volume.dims(), dims, shift),
+    };
+    (dims, bounds)
+}
+
+/// A range without an entry.
+const NO_ENTRIES: [u16; 2] = [1, 0];
 
 /// The bounds of blocks, layer by layer of blocks in parallel.
 fn bounds_of<T: Copy + PartialOrd + Into<f32> + Sync>(
@@ -112,14 +135,14 @@ mod tests {
             let voxels = Voxels::U16(values.clone());
             let volume = Volume::new(dims, [1.0; 3], voxels, ValueScale::default()).unwrap();
             for shift in [1, 2, 3] {
-                let blocks = Blocks::new(&volume, shift);
-                let mut expected = vec![[f32::INFINITY, f32::NEG_INFINITY]; blocks.bounds.len()];
+                let (block_dims, found) = bounds(&volume, shift);
+                let mut expected = vec![[f32::INFINITY, f32::NEG_INFINITY]; found.len()];
                 let cells = dims.map(|n: usize| (n - 1).max(1));
                 for z in 0..cells[2] {
                     for y in 0..cells[1] {
                         for x in 0..cells[0] {
                             let [bx, by, bz] = [x, y, z].map(|i| i >> shift);
-                            let block = (bz * blocks.dims[1] + by) * blocks.dims[0] + bx;
+                            let block = (bz * block_dims[1] + by) * block_dims[0] + bx;
                             for corner in 0..8 {
                                 let at = |i: usize, axis: usize| {
                                     (i + (corner >> axis & 1)).min(dims[axis] - 1)
@@ -133,7 +156,7 @@ mod tests {
                         }
                     }
                 }
-                assert_eq!(blocks.bounds, expected, "{dims:?} {shift}");
+                assert_eq!(found, expected, "{dims:?} {shift}");
             }
         }
     }

@@ -22,76 +22,115 @@ const ROUNDING: f32 = 16.0 * f32::EPSILON;
 /// A colour of 1 in a table. Colours have 16 bits, so that lanes fetch all three at once.
 pub(crate) const FULL_COLOUR: f32 = 65535.0;
 
-/// A baked transfer function.
+/// A transfer function by index, over the values of a volume.
 #[derive(Clone, Debug)]
-pub(crate) struct TransferTable {
-    /// The opacity of a step at each entry.
-    pub(crate) opacities: Vec<f32>,
+pub(crate) struct BakedFunction {
+    index: TableIndex,
+    /// ln(1 − α) at each entry.
+    logarithms: Vec<f64>,
     /// Red, green, blue at each entry in units of 1 / [`FULL_COLOUR`], and 0.
-    pub(crate) colours: Vec<[u16; 4]>,
-    /// index = raw · scale + offset, limited and rounded.
-    pub(crate) scale: f32,
-    pub(crate) offset: f32,
+    colours: Vec<[u16; 4]>,
     /// How many entries before each have an opacity above 0; one more than there are entries.
     lit_before: Vec<u32>,
 }
 
-impl TransferTable {
-    /// The table of `size` ≥ 2 entries over the values of a volume, for steps of `step` > 0 lengths
-    /// of a voxel.
-    pub(crate) fn new(
-        function: &TransferFunction,
-        volume: &Volume,
-        step: f32,
-        size: usize,
-    ) -> Self {
-        let [low, high] = volume.raw_range();
-        let last = (size - 1) as f32;
-        let scale = if high > low { last / (high - low) } else { 0.0 };
-        let [low, high] = [low, high].map(f64::from);
+impl BakedFunction {
+    /// A table of `size` ≥ 2 entries.
+    pub(crate) fn new(function: &TransferFunction, volume: &Volume, size: usize) -> Self {
+        let [low, high] = volume.raw_range().map(f64::from);
         let [slope, intercept] = [volume.scale().slope, volume.scale().intercept].map(f64::from);
-        let mut table = Self {
-            opacities: Vec::with_capacity(size),
+        let mut baked = Self {
+            index: TableIndex::new(volume, size),
+            logarithms: Vec::with_capacity(size),
             colours: Vec::with_capacity(size),
-            scale,
-            offset: -volume.raw_range()[0] * scale,
             lit_before: Vec::with_capacity(size + 1),
         };
         let mut lit = 0;
         for index in 0..size {
-            let raw = low + (high - low) * index as f64 / f64::from(last);
+            let raw = low + (high - low) * index as f64 / (size - 1) as f64;
             let [r, g, b, opacity] = function.at(raw * slope + intercept);
-            let of_step = -(f64::from(step) * (-opacity).ln_1p()).exp_m1();
             let colour = |of: f64| (of * f64::from(FULL_COLOUR)).round() as u16;
-            table.opacities.push(of_step as f32);
-            table.colours.push([colour(r), colour(g), colour(b), 0]);
-            table.lit_before.push(lit);
-            lit += u32::from(table.opacities[index] > 0.0);
+            baked.logarithms.push((-opacity).ln_1p());
+            baked.colours.push([colour(r), colour(g), colour(b), 0]);
+            baked.lit_before.push(lit);
+            lit += u32::from(opacity > 0.0);
         }
-        table.lit_before.push(lit);
-        table
+        baked.lit_before.push(lit);
+        baked
+    }
+
+    /// What it looks like by steps of `step` > 0 lengths of a voxel.
+    pub(crate) fn table(&self, step: f32) -> TransferTable<'_> {
+        let of_step = |&log: &f64| -(f64::from(step) * log).exp_m1() as f32;
+        TransferTable {
+            index: self.index,
+            opacities: self.logarithms.iter().map(of_step).collect(),
+            colours: &self.colours,
+        }
+    }
+
+    /// How values become entries.
+    pub(crate) fn index(&self) -> TableIndex {
+        self.index
+    }
+
+    /// Whether nothing can be seen of what has the entries from `first` to `last`, however long
+    /// steps are.
+    pub(crate) fn is_transparent(&self, [first, last]: [u16; 2]) -> bool {
+        self.lit_before[first as usize] == self.lit_before[last as usize + 1]
+    }
+}
+
+/// A transfer function baked for a step.
+#[derive(Clone, Debug)]
+pub(crate) struct TransferTable<'a> {
+    pub(crate) index: TableIndex,
+    /// The opacity of a step at each entry.
+    pub(crate) opacities: Vec<f32>,
+    /// Red, green, blue at each entry in units of 1 / [`FULL_COLOUR`], and 0.
+    pub(crate) colours: &'a [[u16; 4]],
+}
+
+/// The entry of a raw value: raw · scale + offset, limited and rounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TableIndex {
+    pub(crate) scale: f32,
+    pub(crate) offset: f32,
+    /// The last entry.
+    pub(crate) last: f32,
+}
+
+impl TableIndex {
+    /// For the values of a volume in a table of `size` ≥ 2 entries, at most 2^16.
+    pub(crate) fn new(volume: &Volume, size: usize) -> Self {
+        let [low, high] = volume.raw_range();
+        let last = (size - 1) as f32;
+        let scale = if high > low { last / (high - low) } else { 0.0 };
+        Self {
+            scale,
+            offset: -low * scale,
+            last,
+        }
     }
 
     /// The entry of a raw value; NaN has the first.
-    pub(crate) fn index(&self, raw: f32) -> usize {
+    pub(crate) fn of(&self, raw: f32) -> usize {
         let place = raw * self.scale + self.offset;
         // As lanes do it: NaN becomes the second operand.
         let place = if place > 0.0 { place } else { 0.0 };
-        let last = (self.opacities.len() - 1) as f32;
-        let place = if place < last { place } else { last };
+        let place = if place < self.last { place } else { self.last };
         place.round_ties_even() as usize
     }
 
-    /// Whether nothing can be seen of what is interpolated from raw values from `low` to `high`,
-    /// rounding included. Of equal values the same is interpolated, without rounding.
-    pub(crate) fn is_transparent(&self, low: f32, high: f32) -> bool {
+    /// The first and last entry that what is interpolated from raw values from `low` to `high` can
+    /// have, rounding included. Of equal values the same is interpolated, without rounding.
+    pub(crate) fn range(&self, low: f32, high: f32) -> [u16; 2] {
         let error = if low < high {
             ROUNDING * low.abs().max(high.abs())
         } else {
             0.0
         };
-        let (first, last) = (self.index(low - error), self.index(high + error));
-        self.lit_before[first] == self.lit_before[last + 1]
+        [self.of(low - error) as u16, self.of(high + error) as u16]
     }
 }
 
@@ -120,7 +159,8 @@ mod tests {
     fn opacity_of_a_step_compounds() {
         let function = function(&[[0.0, 1.0, 0.5, 0.25, 0.3], [9.0, 0.0, 0.0, 0.0, 1.0]]);
         for step in [0.125, 0.5, 1.0, 3.0] {
-            let table = TransferTable::new(&function, &volume(vec![0.5, 5.0]), step, 256);
+            let baked = BakedFunction::new(&function, &volume(vec![0.5, 5.0]), 256);
+            let table = baked.table(step);
             let expected = 1.0 - 0.7_f64.powf(f64::from(step));
             assert!((f64::from(table.opacities[0]) - expected).abs() < 1e-7);
             assert_eq!(table.opacities[255], 1.0, "opaque stays opaque");
@@ -131,7 +171,8 @@ mod tests {
     #[test]
     fn tiny_opacities_keep_their_digits() {
         let function = function(&[[0.0, 1.0, 1.0, 1.0, 1e-7]]);
-        let table = TransferTable::new(&function, &volume(vec![0.0, 1.0]), 0.25, 16);
+        let baked = BakedFunction::new(&function, &volume(vec![0.0, 1.0]), 16);
+        let table = baked.table(0.25);
         assert!(
             (table.opacities[3] / 2.5e-8 - 1.0).abs() < 1e-5,
             "{}",
@@ -148,8 +189,10 @@ mod tests {
             [4.1, 1.0, 1.0, 1.0, 1.0],
             [4.1, 0.0, 0.0, 0.0, 0.0],
         ];
-        let table = TransferTable::new(&function(&points), &volume(vec![0.0, 10.0]), 1.0, 1024);
-        assert!(table.is_transparent(0.0, 2.48));
+        let baked = BakedFunction::new(&function(&points), &volume(vec![0.0, 10.0]), 1024);
+        let table = baked.table(1.0);
+        let is_transparent = |low, high| baked.is_transparent(table.index.range(low, high));
+        assert!(is_transparent(0.0, 2.48));
         // Equal values are never interpolated to others.
         let first_lit = table
             .opacities
@@ -157,23 +200,18 @@ mod tests {
             .position(|&opacity| opacity > 0.0)
             .unwrap();
         let raw_of = |index: usize| index as f32 * 10.0 / 1023.0;
-        assert!(table.is_transparent(raw_of(first_lit - 1), raw_of(first_lit - 1)));
-        assert!(!table.is_transparent(raw_of(first_lit), raw_of(first_lit)));
-        assert!(
-            !table.is_transparent(0.0, 10.0),
-            "a value that no voxel has"
-        );
-        assert!(!table.is_transparent(2.0, 2.52));
-        assert!(table.is_transparent(2.58, 10.0));
+        assert!(is_transparent(raw_of(first_lit - 1), raw_of(first_lit - 1)));
+        assert!(!is_transparent(raw_of(first_lit), raw_of(first_lit)));
+        assert!(!is_transparent(0.0, 10.0), "a value that no voxel has");
+        assert!(!is_transparent(2.0, 2.52));
+        assert!(is_transparent(2.58, 10.0));
     }
 
     #[test]
     fn a_constant_volume_has_the_first_entry() {
-        let table = TransferTable::new(&function(&[[0.0; 5]]), &volume(vec![3.0, 3.0]), 1.0, 8);
-        assert_eq!(
-            [3.0, 0.0, 9.0, f32::NAN].map(|raw| table.index(raw)),
-            [0; 4]
-        );
-        assert!(table.is_transparent(3.0, 3.0));
+        let baked = BakedFunction::new(&function(&[[0.0; 5]]), &volume(vec![3.0, 3.0]), 8);
+        let index = baked.index();
+        assert_eq!([3.0, 0.0, 9.0, f32::NAN].map(|raw| index.of(raw)), [0; 4]);
+        assert!(baked.is_transparent(index.range(3.0, 3.0)));
     }
 }

@@ -23,7 +23,7 @@ pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
         if raw.is_nan() {
             continue;
         }
-        let entry = frame.table.index(raw);
+        let entry = frame.table.index.of(raw);
         let weight = (1.0 - ray.opacity) * frame.table.opacities[entry];
         for (sum, &colour) in ray.colour.iter_mut().zip(&frame.table.colours[entry]) {
             *sum += weight * f32::from(colour);

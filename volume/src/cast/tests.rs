@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
+use raywright_bvh::{Aabb, Isa};
 
 use super::*;
 use crate::{
@@ -93,9 +94,8 @@ fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
             step,
             ..CastOptions::default()
         };
-        let expected = caster
-            .render_slowly(&function, camera, size, &options)
-            .unwrap();
+        let prepared = caster.prepare(&function);
+        let expected = prepared.render_slowly(camera, size, &options).unwrap();
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             for skipping in [Skipping::None, Skipping::Distance] {
                 let options = CastOptions {
@@ -103,7 +103,7 @@ fn check(volume: &Volume, camera: &Camera, size: [u32; 2], step: f32) {
                     skipping,
                     ..options
                 };
-                let picture = caster.render(&function, camera, size, &options).unwrap();
+                let picture = prepared.render(camera, size, &options).unwrap();
                 for i in 0..picture.opacity.len() {
                     let of = |p: &Picture| (p.image.pixels()[i], p.opacity[i], p.end[i]);
                     assert_eq!(
@@ -271,7 +271,7 @@ fn a_clip_box_takes_samples_away_and_moves_none() {
     )
     .unwrap();
     let caster = Raycaster::new(volume).unwrap();
-    let function = &functions(volume)[1];
+    let prepared = caster.prepare(&functions(volume)[1]);
     let render = |clip: Option<(Vec3, Vec3)>, isa| {
         let clip = clip.map(|(min, max)| Aabb { min, max });
         let options = CastOptions {
@@ -279,12 +279,8 @@ fn a_clip_box_takes_samples_away_and_moves_none() {
             isa,
             ..CastOptions::default()
         };
-        let picture = caster
-            .render(function, &camera, [40, 40], &options)
-            .unwrap();
-        let slow = caster
-            .render_slowly(function, &camera, [40, 40], &options)
-            .unwrap();
+        let picture = prepared.render(&camera, [40, 40], &options).unwrap();
+        let slow = prepared.render_slowly(&camera, [40, 40], &options).unwrap();
         assert_eq!((&picture.image, &picture.end), (&slow.image, &slow.end));
         picture
     };
@@ -312,7 +308,7 @@ fn a_clip_box_takes_samples_away_and_moves_none() {
         ..CastOptions::default()
     };
     let error = caster
-        .render(function, &camera, [4, 4], &options)
+        .render(&functions(volume)[1], &camera, [4, 4], &options)
         .unwrap_err();
     assert!(matches!(error, CastError::Clip { .. }));
 }

@@ -228,6 +228,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::table::{DEFAULT_SIZE, TableIndex};
     use crate::{
         grid::{ValueScale, Voxels},
         transfer::ControlPoint,
@@ -270,7 +271,8 @@ mod tests {
 
     fn histograms(slope: f32) -> Histograms {
         let volume = volume(slope);
-        Histograms::new(&volume, &Blocks::new(&volume, 4))
+        let index = TableIndex::new(&volume, DEFAULT_SIZE);
+        Histograms::new(&volume, &Blocks::new(&volume, 4, index))
     }
 
     #[test]

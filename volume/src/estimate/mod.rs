@@ -20,7 +20,7 @@ use crate::{
     blocks::Blocks,
     cast::{CastError, CastOptions, reference::lattice, view::View},
     grid::Volume,
-    table::{DEFAULT_SIZE, TransferTable},
+    table::{BakedFunction, DEFAULT_SIZE, TableIndex},
     transfer::TransferFunction,
 };
 use histograms::{Cut, Histograms, OpacityHistograms};
@@ -124,7 +124,7 @@ impl<'a> Estimator<'a> {
     /// Counts the values in the blocks of a volume.
     #[must_use]
     pub fn new(volume: &'a Volume) -> Self {
-        let blocks = Blocks::new(volume, BLOCK_SHIFT);
+        let blocks = Blocks::new(volume, BLOCK_SHIFT, TableIndex::new(volume, DEFAULT_SIZE));
         Self {
             volume,
             histograms: Histograms::new(volume, &blocks),
@@ -147,8 +147,8 @@ impl<'a> Estimator<'a> {
     ) -> Result<Estimate, CastError> {
         options.check()?;
         let projection = camera.projection(width, height)?;
-        let table = TransferTable::new(function, self.volume, options.step, DEFAULT_SIZE);
-        let lit = self.blocks.lit(&table);
+        let baked = BakedFunction::new(function, self.volume, DEFAULT_SIZE);
+        let lit: Vec<bool> = self.blocks.lit(&baked).collect();
         let drawn = |cut| Medium::Drawn(self.histograms.opacities(function, cut));
         let medium = match method {
             EstimateMethod::PaperLinear => drawn(Cut::Linear),

@@ -1,0 +1,41 @@
+//! Pictures of volumes and what they took.
+
+use raywright_imaging::Image;
+
+/// What a picture took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Work {
+    /// Rays that meet the box of the volume.
+    pub rays: u64,
+    /// Samples that were interpolated, some of them a little beyond what can be seen.
+    pub samples: u64,
+    /// Samples of which something is seen.
+    pub lit_samples: u64,
+    /// Jumps over empty space.
+    pub skips: u64,
+}
+
+impl Work {
+    /// Adds what another picture took.
+    pub fn add(&mut self, other: &Self) {
+        self.rays += other.rays;
+        self.samples += other.samples;
+        self.lit_samples += other.lit_samples;
+        self.skips += other.skips;
+    }
+}
+
+/// A picture of a volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// RGB over black, in the colours of the transfer function: those of a screen, as a rule.
+    pub image: Image,
+    /// Opacity of each pixel, row by row.
+    pub opacity: Vec<f32>,
+    /// For each pixel, the number of the sample behind the last one that was looked at, as the
+    /// distance from the eye in steps; 0 where the ray has none.
+    pub end: Vec<f32>,
+    /// What it took.
+    pub work: Work,
+}
