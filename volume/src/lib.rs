@@ -30,8 +30,8 @@ pub mod view;
 mod voxels;
 
 pub use crate::{
-    cast::{Behind, CastError, CastOptions, Picture, Raycaster, Skipping, Work},
-    estimate::{Estimate, EstimateMethod, Estimator},
+    cast::{Behind, CastError, CastOptions, Picture, Prepared, Raycaster, Skipping, Work},
+    estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},

@@ -101,7 +101,8 @@ fn estimates_are_near_the_counts() {
             let ratio = |method| {
                 let (function, camera) =
                     (&view.transfer_functions[&row[1]], &view.cameras[&row[2]]);
-                let estimate = estimator.estimate(function, camera, SIZE, &options, method, 0);
+                let prepared = estimator.prepare(function, method);
+                let estimate = prepared.estimate(camera, SIZE, &options, 0);
                 estimate.expect("an estimate").samples() / number(row, 11)
             };
             for method in [EstimateMethod::CubeRoot, EstimateMethod::MeanExtinction] {

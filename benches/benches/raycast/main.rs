@@ -93,14 +93,13 @@ fn main() {
         let caster = Raycaster::new(&loaded.volume).expect("a volume of usual size");
         vtk.load(&loaded.volume).expect("VTK takes every volume");
         for (tf, function) in &view.transfer_functions {
+            let prepared = caster.prepare(function);
             for (place, camera) in &view.cameras {
                 for step in STEPS {
                     let cast = |isa| {
                         let mut options = CastOptions::default();
                         (options.step, options.isa) = (step, isa);
-                        caster
-                            .render(function, camera, SIZE, &options)
-                            .expect("a picture")
+                        prepared.render(camera, SIZE, &options).expect("a picture")
                     };
                     let mut times = vec![Vec::new(); isas.len()];
                     let (mut theirs, mut pixels) = (Vec::new(), Vec::new());

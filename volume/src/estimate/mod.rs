@@ -18,7 +18,11 @@ use raywright_imaging::Camera;
 
 use crate::{
     blocks::Blocks,
-    cast::{CastError, CastOptions, reference::lattice, view::View},
+    cast::{
+        CastError, CastOptions,
+        reference::lattice,
+        view::{SMALLEST_STEP, View},
+    },
     grid::Volume,
     table::{BakedFunction, DEFAULT_SIZE, TableIndex},
     transfer::TransferFunction,
@@ -104,7 +108,16 @@ pub struct Estimator<'a> {
     histograms: Histograms,
 }
 
-/// What a transfer function makes of the blocks.
+/// What a transfer function makes of the blocks of a volume.
+#[derive(Clone, Debug)]
+pub struct PreparedEstimate<'a> {
+    volume: &'a Volume,
+    dims: [usize; 3],
+    lit: Vec<bool>,
+    medium: Medium,
+}
+
+#[derive(Clone, Debug)]
 enum Medium {
     Drawn(OpacityHistograms),
     Mean(Vec<f32>),
@@ -113,9 +126,7 @@ enum Medium {
 /// What the rays of an estimate read.
 struct March<'a> {
     view: View,
-    dims: [usize; 3],
-    lit: &'a [bool],
-    medium: &'a Medium,
+    prepared: &'a PreparedEstimate<'a>,
     step: f32,
     termination: f32,
 }
@@ -132,35 +143,49 @@ impl<'a> Estimator<'a> {
         }
     }
 
+    /// Prepares the blocks for a transfer function. It pays when more than one picture is estimated
+    /// with it.
+    #[must_use]
+    pub fn prepare(
+        &self,
+        function: &TransferFunction,
+        method: EstimateMethod,
+    ) -> PreparedEstimate<'a> {
+        let baked = BakedFunction::new(function, self.volume, DEFAULT_SIZE);
+        let drawn = |cut| Medium::Drawn(self.histograms.opacities(function, cut));
+        PreparedEstimate {
+            volume: self.volume,
+            dims: self.blocks.dims,
+            lit: self.blocks.lit(&baked).collect(),
+            medium: match method {
+                EstimateMethod::PaperLinear => drawn(Cut::Linear),
+                EstimateMethod::CubeRoot => drawn(Cut::CubeRoot),
+                EstimateMethod::MeanExtinction => {
+                    Medium::Mean(self.histograms.extinctions(function))
+                }
+            },
+        }
+    }
+}
+
+impl PreparedEstimate<'_> {
     /// An estimate for a picture of `width` × `height` pixels; `frame` numbers the draws.
     ///
     /// # Errors
-    /// As [`Raycaster::render`](crate::Raycaster::render).
+    /// As [`Prepared::render`](crate::Prepared::render).
     pub fn estimate(
         &self,
-        function: &TransferFunction,
         camera: &Camera,
         [width, height]: [u32; 2],
         options: &CastOptions,
-        method: EstimateMethod,
         frame: u32,
     ) -> Result<Estimate, CastError> {
         options.check()?;
         let projection = camera.projection(width, height)?;
-        let baked = BakedFunction::new(function, self.volume, DEFAULT_SIZE);
-        let lit: Vec<bool> = self.blocks.lit(&baked).collect();
-        let drawn = |cut| Medium::Drawn(self.histograms.opacities(function, cut));
-        let medium = match method {
-            EstimateMethod::PaperLinear => drawn(Cut::Linear),
-            EstimateMethod::CubeRoot => drawn(Cut::CubeRoot),
-            EstimateMethod::MeanExtinction => Medium::Mean(self.histograms.extinctions(function)),
-        };
         let step = options.step * self.volume.unit_length();
         let march = March {
             view: View::new(self.volume, &projection, step, options.clip.as_ref()),
-            dims: self.blocks.dims,
-            lit: &lit,
-            medium: &medium,
+            prepared: self,
             step: options.step,
             termination: options.termination,
         };
@@ -171,11 +196,7 @@ impl<'a> Estimator<'a> {
                 (first + (first + TILE_SIZE).min(size)) as f32 * 0.5
             };
             let (x, y) = (tile % tiles[0], tile / tiles[0]);
-            march.ray(
-                middle(x, width),
-                middle(y, height),
-                HybridTausworthe::new(frame, tile),
-            )
+            march.ray(middle(x, width), middle(y, height), [frame, tile])
         });
         let (rays, steps): (Vec<_>, Vec<_>) = rays.unzip();
         Ok(Estimate {
@@ -196,7 +217,7 @@ struct Piece {
 
 impl March<'_> {
     /// The ray through a point of the picture, and the steps that it took.
-    fn ray(&self, x: f32, y: f32, mut numbers: HybridTausworthe) -> (EstimatedRay, u64) {
+    fn ray(&self, x: f32, y: f32, [frame, tile]: [u32; 2]) -> (EstimatedRay, u64) {
         let (step, first, last) = lattice(&self.view, x, y);
         let mut steps = 0;
         let (mut front, mut back) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -205,12 +226,12 @@ impl March<'_> {
         let most_depth = -(-self.termination.min(1.0)).ln_1p();
         self.pieces(step, first, last, |piece| {
             steps += 1;
-            if !self.lit[piece.block] {
+            if !self.prepared.lit[piece.block] {
                 return;
             }
             front = front.min(piece.start);
             back = piece.end;
-            if let Medium::Mean(extinctions) = self.medium {
+            if let Medium::Mean(extinctions) = &self.prepared.medium {
                 let per_sample = extinctions[piece.block] * self.step;
                 let more = per_sample * (piece.end - piece.start);
                 if depth <= most_depth && depth + more > most_depth {
@@ -223,7 +244,8 @@ impl March<'_> {
         if front >= back {
             return (EstimatedRay::default(), steps);
         }
-        if let Medium::Drawn(opacities) = self.medium {
+        if let Medium::Drawn(opacities) = &self.prepared.medium {
+            let mut numbers = HybridTausworthe::new(frame, tile);
             // Samples from draw to draw.
             let stride = COARSE_STEP / self.step;
             let mut opacity = 0.0;
@@ -249,43 +271,68 @@ impl March<'_> {
         (ray, steps)
     }
 
-    /// The voxel at a sample along one axis.
-    fn place(&self, step: [f32; 3], k: f32, axis: usize) -> f32 {
-        let place = k * step[axis] + self.view.eye[axis];
-        place.clamp(0.0, self.view.last_voxel[axis])
+    /// The block along one axis at a sample.
+    fn block_along(&self, axis: usize, step: f32, k: f32) -> usize {
+        let place = (k * step + self.view.eye[axis]).max(0.0);
+        (place as usize >> BLOCK_SHIFT).min(self.prepared.dims[axis] - 1)
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        let [across, down, _] = self.prepared.dims;
+        (z * down + y) * across + x
     }
 
     fn block_at(&self, step: [f32; 3], k: f32) -> usize {
-        let block = |axis: usize| {
-            let block = self.place(step, k, axis) as usize >> BLOCK_SHIFT;
-            block.min(self.dims[axis] - 1)
-        };
-        (block(2) * self.dims[1] + block(1)) * self.dims[0] + block(0)
+        self.index(std::array::from_fn(|axis| {
+            self.block_along(axis, step[axis], k)
+        }))
     }
 
-    /// Tells the parts of a ray in the blocks that it passes, in order.
+    /// Tells the parts of a ray in the blocks that it passes, in order: Amanatides, Woo, *A Fast Voxel
+    /// Traversal Algorithm for Ray Tracing*, 1987, each border computed anew.
     fn pieces(&self, step: [f32; 3], first: f32, last: f32, mut tell: impl FnMut(Piece)) {
-        let edge = (1_u32 << BLOCK_SHIFT) as f32;
-        let mut k = first;
-        while k <= last {
-            let mut end = last + 1.0;
-            for (axis, &step) in step.iter().enumerate() {
-                let place = k * step + self.view.eye[axis];
-                let block = (place / edge).floor();
-                let border = if step < 0.0 { block } else { block + 1.0 } * edge;
-                let exit = k + (border - place) / step;
-                if step != 0.0 && exit < end {
-                    end = exit;
+        if first > last {
+            return;
+        }
+        let per_step = step.map(|step| 1.0 / step);
+        let mut block = [0, 1, 2].map(|axis| self.block_along(axis, step[axis], first));
+        // The number of the sample at which the ray leaves its block along an axis.
+        let exit = |axis: usize, block: usize| {
+            let inner = if step[axis] < 0.0 { block } else { block + 1 };
+            let is_last = inner == 0 || inner == self.prepared.dims[axis];
+            if is_last || step[axis].abs() < SMALLEST_STEP {
+                f32::INFINITY
+            } else {
+                ((inner << BLOCK_SHIFT) as f32 - self.view.eye[axis]) * per_step[axis]
+            }
+        };
+        let mut exits = [0, 1, 2].map(|axis| exit(axis, block[axis]));
+        let mut start = first;
+        loop {
+            let next = exits[0].min(exits[1]).min(exits[2]);
+            let end = next.min(last + 1.0);
+            if end > start {
+                tell(Piece {
+                    start,
+                    end,
+                    block: self.index(block),
+                });
+                start = end;
+            }
+            if next > last {
+                return;
+            }
+            for axis in 0..3 {
+                if exits[axis] <= next {
+                    // Not beyond the border: there is no exit.
+                    block[axis] = if step[axis] < 0.0 {
+                        block[axis] - 1
+                    } else {
+                        block[axis] + 1
+                    };
+                    exits[axis] = exit(axis, block[axis]);
                 }
             }
-            // Rounding may leave a ray where it is: it goes on a little.
-            let end = end.max(k + 1e-3 + k * f32::EPSILON);
-            tell(Piece {
-                start: k,
-                end,
-                block: self.block_at(step, (k + end) * 0.5),
-            });
-            k = end;
         }
     }
 }
@@ -335,7 +382,8 @@ mod tests {
                 let samples = picture.work.samples as f64;
                 for method in EstimateMethod::ALL {
                     let estimate = estimator
-                        .estimate(&function, &camera, size, &options, method, 0)
+                        .prepare(&function, method)
+                        .estimate(&camera, size, &options, 0)
                         .unwrap();
                     let ratio = estimate.samples() / samples;
                     // Draws end in coarse steps; silhouettes are known by squares of pixels.
@@ -359,7 +407,8 @@ mod tests {
         for method in EstimateMethod::ALL {
             let options = CastOptions::default();
             let estimate = estimator
-                .estimate(&function, &camera, [33, 17], &options, method, 5)
+                .prepare(&function, method)
+                .estimate(&camera, [33, 17], &options, 5)
                 .unwrap();
             assert_eq!(estimate.tiles, [5, 3]);
             assert!(
