@@ -11,10 +11,12 @@
 //! | [`transfer`], [`presets`] | what a value looks like |
 //! | [`view`] | transfer functions and cameras of a file; a camera without one |
 //! | [`statistics`] | mean and percentiles |
+//! | [`appearance`] | shading, surfaces, pre-integration |
 //! | [`cast`] | a picture of a volume |
 //! | [`estimate`] | how long rays will be, before they are cast |
 #![forbid(unsafe_code)]
 
+pub mod appearance;
 mod blocks;
 pub mod cast;
 mod distance;
@@ -23,6 +25,7 @@ pub mod generate;
 pub mod grid;
 pub mod load;
 pub mod presets;
+mod slabs;
 pub mod statistics;
 mod table;
 pub mod transfer;
@@ -30,6 +33,9 @@ pub mod view;
 mod voxels;
 
 pub use crate::{
+    appearance::{
+        Appearance, AppearanceError, Integration, Interpolation, IsoSurface, Light, Shading,
+    },
     cast::{Behind, CastError, CastOptions, Picture, Prepared, Raycaster, Skipping, Work},
     estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
     generate::Generated,

@@ -8,6 +8,8 @@
 //! the same for a sample, for the bounds of a block and in every instruction set. So a block is
 //! empty only if no sample in it can be seen.
 
+use raywright_bvh::simd::GatherLanes;
+
 use crate::{grid::Volume, transfer::TransferFunction};
 
 /// Entries of a table if nobody wishes otherwise. More than the values of 8 bits, since values
@@ -27,11 +29,13 @@ pub(crate) const FULL_COLOUR: f32 = 65535.0;
 pub(crate) struct BakedFunction {
     index: TableIndex,
     /// ln(1 − α) at each entry.
-    logarithms: Vec<f64>,
+    pub(crate) logarithms: Vec<f64>,
     /// Red, green, blue at each entry in units of 1 / [`FULL_COLOUR`], and 0.
-    colours: Vec<[u16; 4]>,
-    /// How many entries before each have an opacity above 0; one more than there are entries.
+    pub(crate) colours: Vec<[u16; 4]>,
+    /// How many entries before each are seen; one more than there are entries.
     lit_before: Vec<u32>,
+    /// How far beyond the entries of values others are looked at.
+    reach: usize,
 }
 
 impl BakedFunction {
@@ -43,20 +47,38 @@ impl BakedFunction {
             index: TableIndex::new(volume, size),
             logarithms: Vec::with_capacity(size),
             colours: Vec::with_capacity(size),
-            lit_before: Vec::with_capacity(size + 1),
+            lit_before: Vec::new(),
+            reach: 0,
         };
-        let mut lit = 0;
         for index in 0..size {
             let raw = low + (high - low) * index as f64 / (size - 1) as f64;
             let [r, g, b, opacity] = function.at(raw * slope + intercept);
             let colour = |of: f64| (of * f64::from(FULL_COLOUR)).round() as u16;
             baked.logarithms.push((-opacity).ln_1p());
             baked.colours.push([colour(r), colour(g), colour(b), 0]);
-            baked.lit_before.push(lit);
-            lit += u32::from(opacity > 0.0);
         }
-        baked.lit_before.push(lit);
+        baked.count_lit(&[]);
         baked
+    }
+
+    /// The same where the entries of `surfaces` are seen too, and entries up to `reach` beyond those
+    /// of values are looked at.
+    pub(crate) fn with(mut self, surfaces: &[usize], reach: usize) -> Self {
+        self.reach = reach;
+        self.count_lit(surfaces);
+        self
+    }
+
+    fn count_lit(&mut self, surfaces: &[usize]) {
+        let mut lit = 0;
+        let seen = |(entry, &log): (usize, &f64)| log < 0.0 || surfaces.contains(&entry);
+        let counts = self.logarithms.iter().enumerate().map(|entry| {
+            let before = lit;
+            lit += u32::from(seen(entry));
+            before
+        });
+        self.lit_before = counts.collect();
+        self.lit_before.push(lit);
     }
 
     /// What it looks like by steps of `step` > 0 lengths of a voxel.
@@ -75,9 +97,14 @@ impl BakedFunction {
     }
 
     /// Whether nothing can be seen of what has the entries from `first` to `last`, however long
-    /// steps are.
+    /// steps are. A range without an entry is.
     pub(crate) fn is_transparent(&self, [first, last]: [u16; 2]) -> bool {
-        self.lit_before[first as usize] == self.lit_before[last as usize + 1]
+        if first > last {
+            return true;
+        }
+        let first = (first as usize).saturating_sub(self.reach);
+        let last = (last as usize + self.reach).min(self.logarithms.len() - 1);
+        self.lit_before[first] == self.lit_before[last + 1]
     }
 }
 
@@ -120,6 +147,14 @@ impl TableIndex {
         let place = if place > 0.0 { place } else { 0.0 };
         let place = if place < self.last { place } else { self.last };
         place.round_ties_even() as usize
+    }
+
+    /// The entries of raw values in lanes.
+    #[inline(always)]
+    pub(crate) fn lanes<const N: usize, L: GatherLanes<N>>(&self, raw: L) -> L::Int {
+        // The first operand of max() is dropped if it is NaN.
+        let place = raw.mul(L::splat(self.scale)).add(L::splat(self.offset));
+        place.max(L::splat(0.0)).min(L::splat(self.last)).round()
     }
 
     /// The first and last entry that what is interpolated from raw values from `low` to `high` can

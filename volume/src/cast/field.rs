@@ -56,6 +56,9 @@ pub(crate) trait Voxel: Copy + Sync {
     /// Whether values are whole numbers, so that all interpolation with share 0 is exact.
     const IS_WHOLE: bool;
 
+    /// The values at places.
+    fn one<const N: usize, L: GatherLanes<N>>(voxels: &[Self], index: L::Int) -> L;
+
     /// The values at the corners of cells in a plane: at the place, to its right, below, below right.
     fn square<const N: usize, L: GatherLanes<N>>(
         voxels: &[Self],
@@ -68,6 +71,11 @@ macro_rules! pair {
     ($type:ty, $gather:ident) => {
         impl Voxel for [$type; 2] {
             const IS_WHOLE: bool = true;
+
+            #[inline(always)]
+            fn one<const N: usize, L: GatherLanes<N>>(voxels: &[Self], index: L::Int) -> L {
+                L::$gather(voxels, index)[0]
+            }
 
             #[inline(always)]
             fn square<const N: usize, L: GatherLanes<N>>(
@@ -87,6 +95,11 @@ pair!(u16, gather_squares_u16);
 
 impl Voxel for f32 {
     const IS_WHOLE: bool = false;
+
+    #[inline(always)]
+    fn one<const N: usize, L: GatherLanes<N>>(voxels: &[Self], index: L::Int) -> L {
+        L::gather_pairs(voxels, index)[0]
+    }
 
     #[inline(always)]
     fn square<const N: usize, L: GatherLanes<N>>(
@@ -142,16 +155,29 @@ impl<'a, const N: usize, L: GatherLanes<N>, V: Voxel> Field<'a, N, L, V> {
     /// Where sample `k` of rays lies, in voxels.
     #[inline(always)]
     pub(crate) fn place(&self, k: L, step: &[L; 3]) -> [L; 3] {
-        let zero = L::splat(0.0);
         let mut place = *step;
         for axis in 0..3 {
-            place[axis] = k
-                .mul(step[axis])
-                .add(self.eye[axis])
-                .max(zero)
-                .min(self.top[axis]);
+            place[axis] = self.limited(axis, k.mul(step[axis]).add(self.eye[axis]));
         }
         place
+    }
+
+    /// A coordinate moved into the volume.
+    #[inline(always)]
+    pub(crate) fn limited(&self, axis: usize, coordinate: L) -> L {
+        coordinate.max(L::splat(0.0)).min(self.top[axis])
+    }
+
+    /// The raw value of the voxel that is nearest to a place.
+    #[inline(always)]
+    pub(crate) fn nearest(&self, place: &[L; 3]) -> L {
+        let half = L::splat(0.5);
+        let x = place[0].add(half).truncate();
+        let y = place[1].add(half).truncate();
+        let z = place[2].add(half).truncate();
+        let index = L::add_int(L::mul_int(z, self.rows), y);
+        let index = L::add_int(L::mul_int(index, self.row), x);
+        V::one(self.voxels, index)
     }
 
     /// The cell of a place, one of those that blocks own.

@@ -13,7 +13,7 @@ use raywright_bvh::simd::{GatherLanes, LaneKernel};
 use super::{
     Frame, RayResult, Work,
     field::{Field, Voxel},
-    lanes::{LaneStates, NO_PIXEL, Waiting},
+    lanes::{LaneStates, Waiting},
     space::Space,
     view::SMALLEST_STEP,
 };
@@ -24,7 +24,7 @@ use crate::table::TransferTable;
 const PAIRS_PER_CHECK: u32 = 4;
 
 /// New rays are taken when so many of eight lanes are idle.
-const IDLE_EIGHTHS: u32 = 3;
+pub(crate) const IDLE_EIGHTHS: u32 = 3;
 
 /// Casts the rays of a rectangle of pixels.
 pub(crate) struct TileKernel<'a, V> {
@@ -44,10 +44,10 @@ impl<V: Voxel> LaneKernel for TileKernel<'_, V> {
     fn run<const N: usize, L: GatherLanes<N>>(self) {
         let mut waiting = Vec::with_capacity(self.results.len());
         self.set_up::<N, L>(&mut waiting);
-        if self.frame.distances.is_some() {
-            self.cast::<N, L, true>(&waiting);
-        } else {
-            self.cast::<N, L, false>(&waiting);
+        match (self.frame.details, self.frame.distances) {
+            (Some(details), _) => self.cast_detailed::<N, L>(&waiting, details),
+            (None, Some(_)) => self.cast::<N, L, true>(&waiting),
+            (None, None) => self.cast::<N, L, false>(&waiting),
         }
     }
 }
@@ -137,19 +137,9 @@ impl<V: Voxel> TileKernel<'_, V> {
         let (mut samples, mut lit_samples, mut skips) = (0_u64, 0_u64, 0_u64);
         let refill = N as u32 - N as u32 * IDLE_EIGHTHS / 8;
         loop {
-            // Idle lanes take rays.
-            for lane in 0..N {
-                if lanes.k[lane] <= lanes.last[lane] {
-                    continue;
-                }
-                if lanes.pixel[lane] != NO_PIXEL {
-                    self.results[lanes.pixel[lane] as usize] = lanes.result(lane);
-                    lanes.pixel[lane] = NO_PIXEL;
-                }
-                if let Some(ray) = waiting.get(next) {
-                    next += 1;
-                    lanes.take(lane, ray);
-                }
+            lanes.refill(waiting, &mut next, self.results);
+            if lanes.are_idle() {
+                break;
             }
             let step = [
                 L::load(&lanes.step[0]),
@@ -218,15 +208,6 @@ impl<V: Voxel> TileKernel<'_, V> {
             let [r, g, b] = light.colour;
             lanes.colour = [r.store(), g.store(), b.store()];
             lanes.opacity = light.opacity.store();
-            let all_idle = (0..N).all(|lane| lanes.k[lane] > lanes.last[lane]);
-            if all_idle && next == waiting.len() {
-                break;
-            }
-        }
-        for lane in 0..N {
-            if lanes.pixel[lane] != NO_PIXEL {
-                self.results[lanes.pixel[lane] as usize] = lanes.result(lane);
-            }
         }
         self.work.rays += waiting.len() as u64;
         self.work.samples += samples;
@@ -236,7 +217,7 @@ impl<V: Voxel> TileKernel<'_, V> {
 }
 
 /// The opacity of values.
-struct Look<'a, const N: usize, L: GatherLanes<N>> {
+pub(crate) struct Look<'a, const N: usize, L: GatherLanes<N>> {
     table: &'a TransferTable<'a>,
     scale: L,
     offset: L,
@@ -246,7 +227,7 @@ struct Look<'a, const N: usize, L: GatherLanes<N>> {
 
 impl<'a, const N: usize, L: GatherLanes<N>> Look<'a, N, L> {
     #[inline(always)]
-    fn new(table: &'a TransferTable<'a>, is_whole: bool) -> Self {
+    pub(crate) fn new(table: &'a TransferTable<'a>, is_whole: bool) -> Self {
         Self {
             table,
             scale: L::splat(table.index.scale),
@@ -258,7 +239,7 @@ impl<'a, const N: usize, L: GatherLanes<N>> Look<'a, N, L> {
 
     /// The entries of raw values, and opacities where the mask is set and the value is not missing.
     #[inline(always)]
-    fn opacity(&self, raw: L, mask: L::Mask) -> (L::Int, L) {
+    pub(crate) fn opacity(&self, raw: L, mask: L::Mask) -> (L::Int, L) {
         let place = raw.mul(self.scale).add(self.offset);
         let place = if self.is_whole {
             // What is interpolated between the smallest and the largest value has an entry.
@@ -278,14 +259,14 @@ impl<'a, const N: usize, L: GatherLanes<N>> Look<'a, N, L> {
 }
 
 /// What rays have gathered.
-struct Light<const N: usize, L: GatherLanes<N>> {
-    colour: [L; 3],
-    opacity: L,
+pub(crate) struct Light<const N: usize, L: GatherLanes<N>> {
+    pub(crate) colour: [L; 3],
+    pub(crate) opacity: L,
 }
 
 impl<const N: usize, L: GatherLanes<N>> Light<N, L> {
     #[inline(always)]
-    fn add(&mut self, alpha: L, colour: [L; 3]) {
+    pub(crate) fn add(&mut self, alpha: L, colour: [L; 3]) {
         let weight = L::splat(1.0).sub(self.opacity).mul(alpha);
         for (sum, colour) in self.colour.iter_mut().zip(colour) {
             *sum = sum.add(weight.mul(colour));

@@ -3,6 +3,8 @@
 //! What is known of a volume is found once, by [`Raycaster::new`]; what a transfer function makes of
 //! it by [`Raycaster::prepare`]; a picture needs neither again.
 
+mod detailed;
+mod details;
 mod field;
 mod kernel;
 mod lanes;
@@ -16,12 +18,15 @@ pub(crate) mod view;
 use raywright_imaging::{Camera, Image};
 
 use crate::{
+    appearance::{Appearance, AppearanceError, Integration, IsoSurface},
     blocks::Blocks,
     distance::DistanceMap,
     grid::Volume,
+    slabs,
     table::{BakedFunction, DEFAULT_SIZE, FULL_COLOUR, TableIndex, TransferTable},
     transfer::TransferFunction,
 };
+use details::{Details, RawSurface};
 use field::Layout;
 pub use options::{Behind, CastError, CastOptions, Skipping};
 pub use picture::{Picture, Work};
@@ -40,6 +45,8 @@ pub(crate) struct Frame<'a> {
     termination: f32,
     behind: Behind,
     distances: Option<&'a DistanceMap>,
+    /// What else is asked for.
+    details: Option<&'a Details>,
 }
 
 impl Frame<'_> {
@@ -106,11 +113,45 @@ impl<'a> Raycaster<'a> {
     /// picture is made with it.
     #[must_use]
     pub fn prepare(&self, function: &TransferFunction) -> Prepared<'_> {
-        let baked = BakedFunction::new(function, self.volume, DEFAULT_SIZE);
+        self.prepared(function.clone().into())
+    }
+
+    /// Prepares the volume for more than a transfer function.
+    ///
+    /// # Errors
+    /// [`AppearanceError`] if a number of the shading or of a surface has no meaning.
+    pub fn prepare_appearance(
+        &self,
+        appearance: Appearance,
+    ) -> Result<Prepared<'_>, AppearanceError> {
+        appearance.check()?;
+        Ok(self.prepared(appearance))
+    }
+
+    fn prepared(&self, appearance: Appearance) -> Prepared<'_> {
+        let baked = BakedFunction::new(&appearance.function, self.volume, DEFAULT_SIZE);
+        let scale = self.volume.scale();
+        let raw = |surface: &IsoSurface| RawSurface {
+            raw: (surface.value - scale.intercept) / scale.slope,
+            colour: surface.colour.map(|c| c * FULL_COLOUR),
+            opacity: surface.opacity,
+        };
+        let mut surfaces: Vec<RawSurface> = appearance.surfaces.iter().map(raw).collect();
+        surfaces.sort_by(|a, b| a.raw.total_cmp(&b.raw));
+        let [low, high] = self.volume.raw_range();
+        let inside = surfaces.iter().filter(|s| (low..=high).contains(&s.raw));
+        let entries: Vec<usize> = inside.map(|s| baked.index().of(s.raw)).collect();
+        let reach = match appearance.integration {
+            Integration::Samples => 0,
+            Integration::PreIntegrated => slabs::reach(DEFAULT_SIZE),
+        };
+        let baked = baked.with(&entries, reach);
         Prepared {
             caster: self,
             distances: DistanceMap::new(&self.blocks, &baked),
             baked,
+            surfaces,
+            appearance,
         }
     }
 
@@ -133,7 +174,10 @@ impl<'a> Raycaster<'a> {
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     caster: &'a Raycaster<'a>,
+    appearance: Appearance,
     baked: BakedFunction,
+    /// By rising value.
+    surfaces: Vec<RawSurface>,
     distances: DistanceMap,
 }
 
@@ -197,6 +241,10 @@ impl Prepared<'_> {
             end: vec![0.0; pixels],
             work: Work::default(),
         };
+        let is_plain = self.appearance.is_plain();
+        let (appearance, surfaces) = (&self.appearance, &self.surfaces);
+        let details = (!is_plain)
+            .then(|| Details::new(appearance, surfaces, &self.baked, volume, options.step));
         let frame = Frame {
             volume,
             layout,
@@ -208,6 +256,7 @@ impl Prepared<'_> {
                 Skipping::None => None,
                 Skipping::Distance => Some(&self.distances),
             },
+            details: details.as_ref(),
         };
         cast(&frame, &mut picture);
         Ok(picture)

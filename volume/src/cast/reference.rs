@@ -4,36 +4,49 @@ use super::{
     Frame, RayResult,
     view::{SMALLEST_STEP, View},
 };
-use crate::grid::Volume;
+use crate::{appearance::Interpolation, grid::Volume, table::TransferTable};
 
 /// Casts the ray through the centre of a pixel.
 pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
     let (step, first, last) = lattice(&frame.view, x as f32 + 0.5, y as f32 + 0.5);
-    let mut ray = RayResult {
-        colour: [0.0; 3],
-        opacity: 0.0,
-        end: 0.0,
+    let samples = Samples {
+        volume: frame.volume,
+        view: &frame.view,
+        table: frame.table,
+        interpolation: frame
+            .details
+            .map_or(Interpolation::Trilinear, |d| d.interpolation),
     };
-    let mut k = first;
+    let mut ray = RayResult::NOTHING;
+    let (mut k, mut front) = (first, f32::NAN);
     while k <= last {
-        let position = std::array::from_fn(|axis| k * step[axis] + frame.view.eye[axis]);
-        let raw = interpolate(frame.volume, &frame.view, position);
+        let value = samples.value(samples.place(k, step));
+        match frame.details {
+            Some(details) => details.look(&samples, &mut ray, step, k, [front, value]),
+            None if value.is_nan() => {}
+            None => {
+                let entry = frame.table.index.of(value);
+                let [r, g, b, _] = frame.table.colours[entry].map(f32::from);
+                add(&mut ray, frame.table.opacities[entry], [r, g, b]);
+            }
+        }
+        front = value;
         k += 1.0;
         ray.end = k;
-        if raw.is_nan() {
-            continue;
-        }
-        let entry = frame.table.index.of(raw);
-        let weight = (1.0 - ray.opacity) * frame.table.opacities[entry];
-        for (sum, &colour) in ray.colour.iter_mut().zip(&frame.table.colours[entry]) {
-            *sum += weight * f32::from(colour);
-        }
-        ray.opacity += weight;
         if ray.opacity > frame.termination {
             break;
         }
     }
     ray
+}
+
+/// Lays something behind what a ray has gathered.
+pub(crate) fn add(ray: &mut RayResult, opacity: f32, colour: [f32; 3]) {
+    let weight = (1.0 - ray.opacity) * opacity;
+    for (sum, colour) in ray.colour.iter_mut().zip(colour) {
+        *sum += weight * colour;
+    }
+    ray.opacity += weight;
 }
 
 /// The step of the ray through a point of the picture, in voxels, and its first and last sample.
@@ -64,21 +77,42 @@ pub(crate) fn lattice(view: &View, x: f32, y: f32) -> ([f32; 3], f32, f32) {
     (step, first.ceil(), last.floor())
 }
 
-/// The raw value at a place.
-fn interpolate(volume: &Volume, view: &View, position: [f32; 3]) -> f32 {
-    let dims = volume.dims();
-    let (mut cell, mut share) = ([0; 3], [0.0; 3]);
-    for axis in 0..3 {
-        let place = position[axis].max(0.0).min(view.last_voxel[axis]);
-        cell[axis] = (place as usize).min(dims[axis].saturating_sub(2));
-        share[axis] = place - cell[axis] as f32;
+/// The values along rays.
+pub(crate) struct Samples<'a> {
+    volume: &'a Volume,
+    pub(crate) view: &'a View,
+    pub(crate) table: &'a TransferTable<'a>,
+    interpolation: Interpolation,
+}
+
+impl Samples<'_> {
+    /// Where a sample lies, in voxels.
+    pub(crate) fn place(&self, k: f32, step: [f32; 3]) -> [f32; 3] {
+        std::array::from_fn(|axis| {
+            let place = k * step[axis] + self.view.eye[axis];
+            place.max(0.0).min(self.view.last_voxel[axis])
+        })
     }
-    let raw = |corner: usize| {
-        let at = |axis: usize| (cell[axis] + (corner >> axis & 1)).min(dims[axis] - 1);
-        volume.raw((at(2) * dims[1] + at(1)) * dims[0] + at(0))
-    };
-    let lerp = |a: f32, b: f32, share: f32| a + (b - a) * share;
-    let along_x = |corner: usize| lerp(raw(corner), raw(corner + 1), share[0]);
-    let along_y = |corner: usize| lerp(along_x(corner), along_x(corner + 2), share[1]);
-    lerp(along_y(0), along_y(4), share[2])
+
+    /// The raw value at a place.
+    pub(crate) fn value(&self, place: [f32; 3]) -> f32 {
+        let dims = self.volume.dims();
+        if self.interpolation == Interpolation::Nearest {
+            let at = |axis: usize| ((place[axis] + 0.5) as usize).min(dims[axis] - 1);
+            return self.volume.raw((at(2) * dims[1] + at(1)) * dims[0] + at(0));
+        }
+        let (mut cell, mut share) = ([0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            cell[axis] = (place[axis] as usize).min(dims[axis].saturating_sub(2));
+            share[axis] = place[axis] - cell[axis] as f32;
+        }
+        let raw = |corner: usize| {
+            let at = |axis: usize| (cell[axis] + (corner >> axis & 1)).min(dims[axis] - 1);
+            self.volume.raw((at(2) * dims[1] + at(1)) * dims[0] + at(0))
+        };
+        let lerp = |a: f32, b: f32, share: f32| a + (b - a) * share;
+        let along_x = |corner: usize| lerp(raw(corner), raw(corner + 1), share[0]);
+        let along_y = |corner: usize| lerp(along_x(corner), along_x(corner + 2), share[1]);
+        lerp(along_y(0), along_y(4), share[2])
+    }
 }
