@@ -93,7 +93,7 @@ impl Shade {
             (beside(1.0) - beside(-1.0)) * self.per_difference[axis]
         });
         let square = dot(gradient, gradient);
-        if !(SMALLEST_SQUARE < square) {
+        if square.is_nan() || square <= SMALLEST_SQUARE {
             return colour;
         }
         let length = square.sqrt();

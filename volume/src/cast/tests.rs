@@ -549,7 +549,7 @@ fn a_ray_that_leaves_empty_space_has_a_sample_before_it() {
         25.0,
     );
     for step in [0.7, 2.3, 5.0] {
-        let camera = camera.clone().unwrap();
+        let camera = camera.unwrap();
         let picture = check_appearance(&volume, appearance.clone(), &camera, [40, 40], step);
         assert!(picture.opacity.iter().filter(|&&o| o > 0.5).count() > 50);
     }
