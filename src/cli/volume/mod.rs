@@ -1,6 +1,7 @@
 //! `raywright volume`: subcommands about volumes, one file each, and what they share.
 
 mod info;
+mod look;
 mod render;
 mod source;
 

@@ -17,7 +17,7 @@ use raywright::{
     },
 };
 
-use super::source::VolumeOptions;
+use super::{look::LookOptions, source::VolumeOptions};
 use crate::cli::{
     Failure, output,
     run_options::{RunOptions, cancel_on_interrupt},
@@ -46,6 +46,8 @@ pub(crate) struct RenderArgs {
     /// Transfer function: a name in VOLUME.view.json, a file of points, or a preset (ramp, fire, soft-tissue, bone, surface); by default the first of the view file, `own` of a generated volume, or ramp
     #[arg(long, value_name = "NAME|FILE")]
     tf: Option<String>,
+    #[command(flatten)]
+    look: LookOptions,
     /// Camera: a name in VOLUME.view.json, or nine numbers: position, target, up; by default the whole volume
     #[arg(
         long,
@@ -138,6 +140,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             Skip::Distance => Skipping::Distance,
         };
         let caster = Raycaster::new(&stage.volume)?;
+        let prepared = caster.prepare_appearance(args.look.appearance(function)?)?;
         let path = args
             .output
             .clone()
@@ -151,7 +154,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             }
             let turned = orbited(&camera, frame as f32 / frames as f32);
             let start = Instant::now();
-            let picture = caster.render(&function, &turned, [args.width, args.height], &options)?;
+            let picture = prepared.render(&turned, [args.width, args.height], &options)?;
             time += start.elapsed();
             work.add(&picture.work);
             let numbered = args.orbit.map(|_| frame);
