@@ -22,6 +22,7 @@ pub mod estimate;
 pub mod generate;
 pub mod grid;
 pub mod load;
+pub mod predict;
 pub mod presets;
 pub mod statistics;
 mod table;
