@@ -25,6 +25,7 @@ pub mod load;
 pub mod predict;
 pub mod presets;
 pub mod statistics;
+pub mod steer;
 mod table;
 pub mod transfer;
 pub mod view;

@@ -62,6 +62,8 @@ pub struct EstimatedRay {
     pub back: f32,
     /// Number of the sample at which it is expected to end.
     pub end: f32,
+    /// Expected number of samples in blocks in which something can be seen.
+    pub lit: f32,
 }
 
 impl EstimatedRay {
@@ -79,6 +81,8 @@ pub struct Estimate {
     pub tiles: [u32; 2],
     /// The ray through the middle of each square, row by row.
     pub rays: Vec<EstimatedRay>,
+    /// How many of them meet the box of the volume.
+    pub in_box: u32,
     /// Blocks and draws that were looked at: what the estimate took.
     pub steps: u64,
 }
@@ -181,6 +185,8 @@ impl<'a> Estimator<'a> {
         Ok(Estimate {
             tiles,
             rays,
+            // A ray that meets the box passes at least one block.
+            in_box: steps.iter().filter(|&&steps| steps > 0).count() as u32,
             steps: steps.iter().sum(),
         })
     }
@@ -201,6 +207,7 @@ impl March<'_> {
         let mut steps = 0;
         let (mut front, mut back) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut depth, mut end) = (0.0, f32::INFINITY);
+        let mut lit = 0.0;
         // What a ray has to pass to be as opaque as the threshold.
         let most_depth = -(-self.termination.min(1.0)).ln_1p();
         self.pieces(step, first, last, |piece| {
@@ -219,6 +226,7 @@ impl March<'_> {
                 }
                 depth += more;
             }
+            lit += (piece.end.min(end) - piece.start).max(0.0);
         });
         if front >= back {
             return (EstimatedRay::default(), steps);
@@ -237,6 +245,8 @@ impl March<'_> {
                 k = next;
                 if opacity > self.termination {
                     end = k;
+                    // As much of what is left as of the whole.
+                    lit *= (end - front) / (back - front);
                     break;
                 }
             }
@@ -245,6 +255,7 @@ impl March<'_> {
             front,
             back,
             end: end.min(back),
+            lit,
         };
         (ray, steps)
     }
