@@ -16,6 +16,8 @@
 //! shorter takes more than the target and the longer at most the target, so that a model that is not
 //! monotone cannot lose both; at most [`MAX_EVALUATIONS`] questions are asked.
 
+use crate::grid::Volume;
+
 /// Questions to the model at most.
 pub const MAX_EVALUATIONS: u32 = 16;
 
@@ -37,7 +39,27 @@ pub struct StepLimits {
     pub longest: f64,
 }
 
+impl Default for StepLimits {
+    fn default() -> Self {
+        Self {
+            shortest: 0.25,
+            longest: 8.0,
+        }
+    }
+}
+
 impl StepLimits {
+    /// The usual limits, with at least two samples across the shortest axis of a volume.
+    #[must_use]
+    pub fn for_volume(volume: &Volume) -> Self {
+        let usual = Self::default();
+        let across = volume.extent().min_element() / volume.unit_length();
+        Self {
+            shortest: usual.shortest,
+            longest: (f64::from(across) * 0.5).clamp(usual.shortest, usual.longest),
+        }
+    }
+
     /// Whether both are numbers in order.
     pub(super) fn is_valid(&self) -> bool {
         self.shortest > 0.0 && self.longest >= self.shortest && self.longest.is_finite()
