@@ -13,6 +13,9 @@
 //! | [`statistics`] | mean and percentiles |
 //! | [`cast`] | a picture of a volume |
 //! | [`estimate`] | how long rays will be, before they are cast |
+//! | [`predict`] | what a frame will take, before it is drawn |
+//! | [`steer`] | in which quality a frame takes a given time |
+//! | [`sequence`] | what is to be seen at each moment of a recording |
 #![forbid(unsafe_code)]
 
 mod blocks;
@@ -24,6 +27,7 @@ pub mod grid;
 pub mod load;
 pub mod predict;
 pub mod presets;
+pub mod sequence;
 pub mod statistics;
 pub mod steer;
 mod table;
@@ -37,7 +41,10 @@ pub use crate::{
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},
+    predict::{FramePredictor, Outlook, PixelsPerRay, Prediction, PredictorParams, Quality},
+    sequence::Sequence,
     statistics::Statistics,
+    steer::{Mode, Next, Steering, SteeringParams, WorkClock},
     transfer::{ControlPoint, TransferError, TransferFunction},
     view::View,
 };

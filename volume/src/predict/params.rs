@@ -100,7 +100,7 @@ impl PredictorParams {
             return Err(fault("additive_memory", self.additive_memory, "1 or more"));
         }
         if let Some([low, high]) = self.fallback {
-            if !(low >= 0.0) {
+            if !(0.0..1.0).contains(&low) {
                 return Err(fault("fallback", low, "0 to 1, ascending"));
             }
             if !(high > low && high <= 1.0) {

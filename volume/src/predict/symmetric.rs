@@ -290,8 +290,8 @@ mod tests {
         let mut column = Vec::new();
         after.remove_first(&mut column);
         assert_eq!(after.order(), 5);
-        for i in 0..5 {
-            assert_eq!(column[i], before.at(i + 1, 0));
+        for (i, first) in column.clone().into_iter().enumerate() {
+            assert_eq!(first, before.at(i + 1, 0));
             for j in 0..5 {
                 assert_eq!(after.at(i, j), before.at(i + 1, j + 1));
             }

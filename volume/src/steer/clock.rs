@@ -108,12 +108,13 @@ mod tests {
     use super::*;
 
     fn work() -> Work {
-        let mut work = Work::default();
-        work.rays = 1_000_000;
-        work.skips = 2_000_000;
-        work.samples = 10_000_000;
-        work.lit_samples = 4_000_000;
-        work
+        Work {
+            rays: 1_000_000,
+            skips: 2_000_000,
+            samples: 10_000_000,
+            lit_samples: 4_000_000,
+            ..Work::default()
+        }
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod mode;
 mod model;
 mod search;
 
+pub(crate) use clock::unit;
 pub use clock::{SpeedChange, WorkClock};
 pub use mode::{Mode, Next, Pass, Resolution, Steering, SteeringError, SteeringParams};
 pub use model::{Forecast, NoModel, TimeModel};

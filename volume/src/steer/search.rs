@@ -120,7 +120,7 @@ pub fn search_step(
     let mut ask = |step: f64| {
         evaluations += 1;
         let time = time_of(step);
-        (time, evaluations, time >= 0.0 && time < f64::INFINITY)
+        (time, evaluations, (0.0..f64::INFINITY).contains(&time))
     };
     let start = if start.is_finite() { start } else { longest };
     let mut step = if target == f64::INFINITY {

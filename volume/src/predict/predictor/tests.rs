@@ -15,12 +15,14 @@ fn outlook(angle: f64, lit_share: f64) -> Outlook {
 
 fn work(outlook: &Outlook, quality: Quality) -> Work {
     let samples = outlook.lit_length / quality.coarseness() * 0.8;
-    let mut work = Work::default();
-    work.rays = outlook.rays(quality) as u64;
-    work.samples = samples as u64;
-    work.lit_samples = (0.5 * samples) as u64;
-    work.skips = work.rays * 5;
-    work
+    let rays = outlook.rays(quality) as u64;
+    Work {
+        rays,
+        samples: samples as u64,
+        lit_samples: (0.5 * samples) as u64,
+        skips: rays * 5,
+        ..Work::default()
+    }
 }
 
 fn costs() -> crate::predict::WorkCosts {
@@ -147,8 +149,10 @@ fn frames_with_nothing_to_see() {
         let mut nothing = outlook(0.0, 0.0);
         (nothing.length, nothing.longest) = (0.0, 0.0);
         let quality = Quality::with_step(1.0);
-        let mut work = Work::default();
-        work.rays = 100_000;
+        let work = Work {
+            rays: 100_000,
+            ..Work::default()
+        };
         for _ in 0..50 {
             let lesson = predictor.learn(&nothing, quality, &work, 2e-3).unwrap();
             assert_eq!(lesson, Lesson::NoSamples);
