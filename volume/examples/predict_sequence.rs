@@ -6,14 +6,14 @@
 //! predictor is led through the same frames, by the work clock and by the wall. Printed: root mean
 //! square and median of the relative error after the first ten frames, root mean square in frames
 //! whose transfer function is new, and the share of frames that took more than 1.2 times what was
-//! predicted, in percent.
+//! predicted, in percent; and vectors in the dictionary.
 
 use std::{env, error::Error, path::PathBuf, time::Instant};
 
 use raywright_volume::{
     CastOptions, EstimateMethod, Estimator, FramePredictor, LoadOptions, Outlook, PredictorParams,
     Quality, Raycaster, View, Work, WorkClock, load_volume,
-    predict::{CostTarget, FeatureForm, FeatureScales, KrlsParams, SampleUnit},
+    predict::{CostTarget, FeatureForm, FeatureScales, SampleUnit, WorkCosts},
     sequence::script::{Start, Views, thirty_seconds},
 };
 
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{}, {steps}, {} frames", path.display(), frames.len());
         println!("{:40} {:^31}   {:^31}", "", "work clock", "wall");
         for (name, params) in predictors() {
-            let clock = WorkClock::default().with_noise(0.02, 7);
+            let clock = WorkClock::new(WorkCosts::default()).with_noise(0.02, 7);
             let work = run(params, &frames, |index, frame| {
                 clock.time(&frame.work, index)
             })?;
@@ -126,23 +126,11 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
             "plus, unit corrected",
             with(|p| p.unit = SampleUnit::Corrected),
         ),
-        ("plus, no bias", with(|p| p.bias = None)),
         ("plus, no speed", with(|p| p.speed_memory = None)),
-        ("plus, speed over 5", with(|p| p.speed_memory = Some(5.0))),
-        ("plus, speed over 20", with(|p| p.speed_memory = Some(20.0))),
         ("plus, no fallback", with(|p| p.fallback = None)),
-        (
-            "plus, fallback 0.02-0.2",
-            with(|p| p.fallback = Some([0.02, 0.2])),
-        ),
-        (
-            "plus, fallback 0.3-0.9",
-            with(|p| p.fallback = Some([0.3, 0.9])),
-        ),
-        ("additive alone", with(|p| p.cost = None)),
+        ("plus, no kernel model", with(|p| p.cost = None)),
         ("plus, forgetting 1", forgetting(1.0)),
         ("plus, forgetting 0.95", forgetting(0.95)),
-        ("plus, forgetting 0.9", forgetting(0.9)),
         ("plus, no direction", scales(|s| s.direction = 0.0)),
         ("plus, no voxel size", scales(|s| s.voxel_size = 0.0)),
         ("plus, no step", scales(|s| s.step = 0.0)),
@@ -151,10 +139,6 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
         ("plus, no lit share", scales(|s| s.lit_share = 0.0)),
         ("plus, scales x 0.5", scales(|s| *s = s.scaled(0.5))),
         ("plus, scales x 2", scales(|s| *s = s.scaled(2.0))),
-        (
-            "plus, dictionary 32",
-            with(|p| p.cost = Some(KrlsParams::default().with_limit(32).with_forgetting(0.98))),
-        ),
     ]
 }
 

@@ -21,7 +21,8 @@ pub struct Outlook {
     pub volume_version: u64,
     /// Unit direction of view, in the space of the volume.
     pub direction: [f64; 3],
-    /// Side of a voxel at the centre of the volume as seen by the camera, in pixels; above 0.
+    /// Side of a voxel at the centre of the volume as seen by the camera, in pixels; above 0. From
+    /// within the volume, of one a quarter of its diagonal away.
     pub pixels_per_voxel: f64,
     /// Pixels whose rays meet the box of the volume.
     pub rays: f64,
@@ -67,8 +68,11 @@ impl Outlook {
         let forward = (camera.target - camera.origin).as_dvec3();
         let centre = (volume.extent() * 0.5 - camera.origin).as_dvec3();
         let unit = f64::from(volume.unit_length());
-        // Within the volume a voxel at the centre would be of any size.
-        let distance = centre.length().max(unit);
+        // From within, what is seen is about a quarter of the diagonal away, not at the centre.
+        let distance = centre
+            .length()
+            .hypot(volume.extent().as_dvec3().length() * 0.25)
+            .max(unit);
         let half_fov = f64::from(camera.vertical_fov_degrees).to_radians() * 0.5;
         let picture = f64::from(width) * f64::from(height);
         Self {

@@ -77,7 +77,7 @@ impl PredictorParams {
             target: CostTarget::LogRatio,
             unit: SampleUnit::Estimated,
             bias: Some(krls.with_forgetting(0.98)),
-            speed_memory: Some(10.0),
+            speed_memory: Some(5.0),
             fallback: Some([0.1, 0.5]),
             cold_start: WorkCosts::default(),
             additive_memory: 64.0,

@@ -4,7 +4,7 @@
 //! have two learners, since they have different causes and time constants: β, the logarithm of
 //! samples taken over samples estimated, which no clock disturbs; and σ, the cost of a sample. What
 //! the machine does on the whole (clock rate, other programs) is one factor g, which follows within
-//! some ten frames. And where a frame is unlike any before, as the kernel model itself says, the
+//! some frames. And where a frame is unlike any before, as the kernel model itself says, the
 //! additive model takes over. Learners are told times as they would be at g = 1.
 //!
 //! Invariants: predictions are finite and not negative; a time that cannot be (0, negative, not a
@@ -277,19 +277,23 @@ impl FramePredictor {
             prediction.time.min(additive_time),
             prediction.time.max(additive_time),
         );
-        let odd = self.frames > 0 && !(low / OUTLIER..=high * OUTLIER).contains(&time);
+        // Where there is nothing to sample, times are all overhead, of which little is known.
+        let sampled = prediction.samples > 0.0 && work.samples > 0;
+        let odd = self.frames > 0 && sampled && !(low / OUTLIER..=high * OUTLIER).contains(&time);
         if odd && self.outliers + 1 >= OUTLIERS {
             self.reset(self.volume_version);
             return self.learn(outlook, quality, work, time);
         }
-        self.outliers = if odd { self.outliers + 1 } else { 0 };
+        if sampled {
+            self.outliers = if odd { self.outliers + 1 } else { 0 };
+        }
         let time = if odd {
             time.clamp(low / OUTLIER_WEIGHT, high * OUTLIER_WEIGHT)
         } else {
             time
         };
         let residual = (time / prediction.time).ln();
-        if self.frames > 0 && prediction.novelty <= KNOWN {
+        if self.frames > 0 && sampled && prediction.novelty <= KNOWN {
             push(&mut self.residuals, RESIDUALS, residual);
             self.learn_speed(residual);
         }
@@ -297,15 +301,14 @@ impl FramePredictor {
         let usual_time = time / self.speed();
         self.additive.learn(&Counts::from(work), usual_time);
         self.learn_counts(outlook, quality, work, &features)?;
-        let samples = prediction.samples;
-        if samples <= 0.0 || work.samples == 0 {
+        if !sampled {
             return Ok(Lesson::NoSamples);
         }
         let lit = outlook.lit_length / quality.coarseness();
         if lit > 0.0 {
             push(&mut self.costs, COSTS, usual_time / lit);
         }
-        let cost = usual_time / samples;
+        let cost = usual_time / prediction.samples;
         let first_cost = *self.first_cost.get_or_insert(cost);
         if let Some(model) = &mut self.cost {
             let target = match self.params.target {
