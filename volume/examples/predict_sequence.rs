@@ -137,6 +137,7 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
         ("plus, no termination", scales(|s| s.termination = 0.0)),
         ("plus, no coarse steps", scales(|s| s.coarse_steps = 0.0)),
         ("plus, no lit share", scales(|s| s.lit_share = 0.0)),
+        ("plus, no seen share", scales(|s| s.seen_share = 0.0)),
         ("plus, scales x 0.5", scales(|s| *s = s.scaled(0.5))),
         ("plus, scales x 2", scales(|s| *s = s.scaled(2.0))),
     ]

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use raywright_volume::predict::{Krls, KrlsParams, Learned};
 
-const FEATURES: usize = 8;
+const FEATURES: usize = 9;
 
 /// Points far enough from each other to be novel: splitmix64 of the number.
 fn point(index: usize, shift: f64) -> [f64; FEATURES] {

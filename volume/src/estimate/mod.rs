@@ -64,6 +64,8 @@ pub struct EstimatedRay {
     pub end: f32,
     /// Expected number of samples in blocks in which something can be seen.
     pub lit: f32,
+    /// Expected number of samples of which something is seen.
+    pub seen: f32,
 }
 
 impl EstimatedRay {
@@ -120,6 +122,7 @@ struct March<'a> {
     dims: [usize; 3],
     lit: &'a [bool],
     medium: &'a Medium,
+    seen_shares: &'a [f32],
     step: f32,
     termination: f32,
 }
@@ -165,6 +168,7 @@ impl<'a> Estimator<'a> {
             dims: self.blocks.dims,
             lit: &lit,
             medium: &medium,
+            seen_shares: &self.histograms.seen_shares(function),
             step: options.step,
             termination: options.termination,
         };
@@ -207,7 +211,7 @@ impl March<'_> {
         let mut steps = 0;
         let (mut front, mut back) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut depth, mut end) = (0.0, f32::INFINITY);
-        let mut lit = 0.0;
+        let (mut lit, mut seen) = (0.0, 0.0);
         // What a ray has to pass to be as opaque as the threshold.
         let most_depth = -(-self.termination.min(1.0)).ln_1p();
         self.pieces(step, first, last, |piece| {
@@ -226,7 +230,9 @@ impl March<'_> {
                 }
                 depth += more;
             }
-            lit += (piece.end.min(end) - piece.start).max(0.0);
+            let samples = (piece.end.min(end) - piece.start).max(0.0);
+            lit += samples;
+            seen += samples * self.seen_shares[piece.block];
         });
         if front >= back {
             return (EstimatedRay::default(), steps);
@@ -246,7 +252,9 @@ impl March<'_> {
                 if opacity > self.termination {
                     end = k;
                     // As much of what is left as of the whole.
-                    lit *= (end - front) / (back - front);
+                    let share = (end - front) / (back - front);
+                    lit *= share;
+                    seen *= share;
                     break;
                 }
             }
@@ -256,6 +264,7 @@ impl March<'_> {
             back,
             end: end.min(back),
             lit,
+            seen,
         };
         (ray, steps)
     }

@@ -12,7 +12,7 @@
 use super::{Outlook, Quality};
 
 /// Number of features.
-pub const FEATURES: usize = 8;
+pub const FEATURES: usize = 9;
 
 /// Largest magnitude of a feature.
 const LIMIT: f64 = 1000.0;
@@ -33,14 +33,18 @@ pub struct FeatureScales {
     pub coarse_steps: f64,
     /// For the share of samples in blocks in which something can be seen.
     pub lit_share: f64,
+    /// For the square root of the share of samples of which something is seen: it is the small shares
+    /// that differ in what they cost.
+    pub seen_share: f64,
 }
 
 impl Default for FeatureScales {
-    /// Over the scripted sequences of eight volumes (192², 10 frames a second, by the work clock with
-    /// 2 % of noise; example `predict_sequence`, 2026), times are off by 7.2 % root mean square with
-    /// these, by 7.2 to 8.2 % with any one of them halved or doubled, by 8.3 % with all of them
-    /// halved and by 8.9 % with all doubled; without the step by 14 % where it changes, without the
-    /// lit share by 12 %; in raw units by 21 %.
+    /// Over the scripted sequences of eight volumes (192², 10 frames a second, step 0.75, by the work
+    /// clock with 2 % of noise; example `predict_sequence`, 2026) times are off by 6.8 % root mean
+    /// square, and by 14 % in frames whose transfer function is new. With all halved: 6.8 and 16 %;
+    /// all doubled: 7.5 and 14 %; without the seen share 7.1 and 22 %; without any other one 6.6 to
+    /// 7.0 and 12 to 15 %, save the step: where it changes, 14 instead of 7.1 %. In raw units: 21 and
+    /// 46 %. By the wall clock of a busy machine voxel size and lit share are worth more.
     fn default() -> Self {
         Self {
             direction: 15.0,
@@ -49,6 +53,7 @@ impl Default for FeatureScales {
             termination: 60.0,
             coarse_steps: 10.0,
             lit_share: 40.0,
+            seen_share: 60.0,
         }
     }
 }
@@ -64,6 +69,7 @@ impl FeatureScales {
             termination: self.termination * factor,
             coarse_steps: self.coarse_steps * factor,
             lit_share: self.lit_share * factor,
+            seen_share: self.seen_share * factor,
         }
     }
 }
@@ -103,6 +109,7 @@ fn scaled(scales: &FeatureScales, outlook: &Outlook, quality: Quality) -> [f64; 
         scales.termination * outlook.termination_share(),
         scales.coarse_steps * (1.0 + outlook.coarse_steps).log2(),
         scales.lit_share * outlook.lit_share(),
+        scales.seen_share * outlook.seen_share().sqrt(),
     ]
 }
 
@@ -131,6 +138,7 @@ mod tests {
             length: 600.0,
             longest: 1000.0,
             lit_length: 300.0,
+            seen_length: 150.0,
             coarse_steps: 7.0,
         }
     }
@@ -139,7 +147,7 @@ mod tests {
     fn a_frame_in_units_of_the_kernel() {
         let form = FeatureForm::Scaled(FeatureScales::default());
         let got = form.features(&outlook(), Quality::with_step(0.5));
-        let expected = [0.0, 9.0, -12.0, 20.0, -20.0, 24.0, 30.0, 20.0];
+        let expected = [0.0, 9.0, -12.0, 20.0, -20.0, 24.0, 30.0, 20.0, 30.0];
         for (got, expected) in got.iter().zip(expected) {
             assert!((got - expected).abs() < 1e-12, "{got} {expected}");
         }
@@ -154,7 +162,7 @@ mod tests {
     fn a_frame_in_units_of_the_paper() {
         let got = FeatureForm::Raw.features(&outlook(), Quality::with_step(2.0));
         let elevation = -53.130_102_354_155_98;
-        let expected = [90.0, elevation, 4.0, 2.0, 7.0, 0.0, 0.0, 0.0];
+        let expected = [90.0, elevation, 4.0, 2.0, 7.0, 0.0, 0.0, 0.0, 0.0];
         for (got, expected) in got.iter().zip(expected) {
             assert!((got - expected).abs() < 1e-9, "{got} {expected}");
         }
@@ -164,6 +172,7 @@ mod tests {
     fn nothing_to_see_and_huge_values() {
         let mut outlook = outlook();
         (outlook.length, outlook.longest, outlook.lit_length) = (0.0, 0.0, 0.0);
+        outlook.seen_length = 0.0;
         outlook.pixels_per_voxel = 1e300;
         outlook.coarse_steps = 1e300;
         let scales = FeatureScales::default().scaled(100.0);

@@ -12,6 +12,7 @@
 //! | `krls` | which cost a sample has in frames like this one |
 //! | `additive` | what rays, jumps and samples cost, in frames like none |
 //! | `predictor` | the time of a frame, from all of these |
+//! | `prediction` | what it answers with |
 //!
 //! Invariants: nothing here reads a clock, times are told; equal lessons in equal order give equal
 //! predictions. Times are in seconds, steps and lengths in lengths of a voxel.
@@ -21,6 +22,7 @@ mod features;
 mod krls;
 mod outlook;
 mod params;
+mod prediction;
 mod predictor;
 mod quality;
 mod symmetric;
@@ -30,7 +32,8 @@ pub use features::{FEATURES, FeatureForm, FeatureScales};
 pub use krls::{Krls, KrlsError, KrlsParams, KrlsPrediction, Learned};
 pub use outlook::Outlook;
 pub use params::{CostTarget, PredictorParams, SampleUnit};
-pub use predictor::{FrameModel, FramePredictor, Lesson, Prediction};
+pub use prediction::{FrameModel, Lesson, Prediction};
+pub use predictor::FramePredictor;
 pub use quality::{PixelsPerRay, Quality};
 
 /// Why nothing can be predicted or learned.

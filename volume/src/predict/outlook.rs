@@ -33,6 +33,8 @@ pub struct Outlook {
     pub longest: f64,
     /// The part of `length` within blocks in which something can be seen.
     pub lit_length: f64,
+    /// The part of `length` at which something is seen.
+    pub seen_length: f64,
     /// Blocks that the estimate looked at, for each of its rays that met the box.
     pub coarse_steps: f64,
 }
@@ -53,7 +55,8 @@ impl Outlook {
             let first = tile * TILE_SIZE;
             f64::from((first + TILE_SIZE).min(size).saturating_sub(first))
         };
-        let (mut length, mut longest, mut lit_length) = (0.0, 0.0, 0.0);
+        let (mut length, mut longest) = (0.0, 0.0);
+        let (mut lit_length, mut seen_length) = (0.0, 0.0);
         for (index, ray) in estimate.rays.iter().enumerate() {
             let (x, y) = (
                 index as u32 % estimate.tiles[0],
@@ -63,6 +66,7 @@ impl Outlook {
             length += weight * f64::from(ray.end - ray.front);
             longest += weight * f64::from(ray.back - ray.front);
             lit_length += weight * f64::from(ray.lit);
+            seen_length += weight * f64::from(ray.seen);
         }
         let coarse_rays = f64::from(estimate.in_box);
         let forward = (camera.target - camera.origin).as_dvec3();
@@ -83,6 +87,7 @@ impl Outlook {
             length,
             longest,
             lit_length,
+            seen_length,
             coarse_steps: estimate.steps as f64 / coarse_rays.max(1.0),
         }
     }
@@ -121,6 +126,12 @@ impl Outlook {
         share(self.lit_length, self.length)
     }
 
+    /// The share of `length` at which something is seen, 0..=1.
+    #[must_use]
+    pub fn seen_share(&self) -> f64 {
+        share(self.seen_length, self.length)
+    }
+
     /// The share of `longest` that is expected to be left out because rays end early, 0..=1.
     #[must_use]
     pub fn termination_share(&self) -> f64 {
@@ -135,6 +146,7 @@ impl Outlook {
             ("length", self.length, 0.0),
             ("longest", self.longest, 0.0),
             ("lit_length", self.lit_length, 0.0),
+            ("seen_length", self.seen_length, 0.0),
             ("coarse_steps", self.coarse_steps, 0.0),
         ] {
             if !(value >= least && value.is_finite()) {
@@ -207,6 +219,7 @@ mod tests {
             close(outlook.pixels_per_voxel, side / 32.0, 0.02);
             assert_eq!(outlook.length, outlook.longest);
             close(outlook.lit_length, outlook.length, 1e-6);
+            close(outlook.seen_length, outlook.length, 1e-6);
             assert_eq!(outlook.direction, [0.0, 0.0, 1.0]);
             assert!(outlook.coarse_steps >= 2.0);
             let quality = Quality {

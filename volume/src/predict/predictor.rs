@@ -13,8 +13,8 @@
 use std::collections::VecDeque;
 
 use super::{
-    AdditiveModel, CostTarget, Counts, FEATURES, Krls, Outlook, PixelsPerRay, PredictError,
-    PredictorParams, Quality, SampleUnit,
+    AdditiveModel, CostTarget, Counts, FEATURES, FrameModel, Krls, Lesson, Outlook, PixelsPerRay,
+    PredictError, Prediction, PredictorParams, Quality, SampleUnit,
 };
 use crate::cast::Work;
 
@@ -55,40 +55,6 @@ const RATIO_MEMORY: f64 = 10.0;
 
 /// Units of costs for the kernel model, seconds: numbers near 1.
 const COST_UNIT: f64 = 1e-9;
-
-/// What a frame is expected to take.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Prediction {
-    /// Samples, in the unit of the cost.
-    pub samples: f64,
-    /// Seconds of a sample, everything else included; 0 if there are no samples.
-    pub cost_per_sample: f64,
-    /// Seconds.
-    pub time: f64,
-    /// Standard deviation of the logarithm of the time: 0.05 is some 5 %.
-    pub deviation: f64,
-    /// 0 if frames like this one are known, towards 1 if there was none.
-    pub novelty: f64,
-    /// The work that is expected.
-    pub counts: Counts,
-}
-
-/// What became of a lesson.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Lesson {
-    /// It was learned.
-    Learned,
-    /// The time is far from the prediction; it was learned as one less far.
-    Outlier,
-    /// There was no sample: only what an empty frame takes was learned.
-    NoSamples,
-    /// The time is not a positive finite number: nothing was learned.
-    BadTime,
-    /// The outlook is one of a volume of an earlier version: nothing was learned.
-    Stale,
-}
 
 /// Predicts frames, and learns from them.
 #[derive(Clone, Debug)]
@@ -202,10 +168,7 @@ impl FramePredictor {
     /// One frame in any quality.
     #[must_use]
     pub fn frame<'a>(&'a self, outlook: &'a Outlook) -> FrameModel<'a> {
-        FrameModel {
-            predictor: self,
-            outlook,
-        }
+        FrameModel::new(self, outlook)
     }
 
     /// The step with which a frame holds `target` seconds even if samples cost what the dearest of
@@ -460,7 +423,7 @@ fn estimated(outlook: &Outlook, quality: Quality) -> Counts {
         rays,
         skips: rays * outlook.coarse_steps,
         samples,
-        lit: samples,
+        lit: outlook.seen_length / quality.coarseness(),
     }
 }
 
@@ -474,36 +437,6 @@ fn push(queue: &mut VecDeque<f64>, limit: usize, value: f64) {
         queue.pop_front();
     }
     queue.push_back(value);
-}
-
-/// A frame whose time is asked for in different qualities.
-#[derive(Clone, Copy, Debug)]
-pub struct FrameModel<'a> {
-    predictor: &'a FramePredictor,
-    outlook: &'a Outlook,
-}
-
-impl FrameModel<'_> {
-    /// What the frame will take in some quality.
-    ///
-    /// # Errors
-    /// As [`FramePredictor::predict`].
-    pub fn predict(&self, quality: Quality) -> Result<Prediction, PredictError> {
-        self.predictor.predict(self.outlook, quality)
-    }
-
-    /// As [`FramePredictor::safe_step`].
-    ///
-    /// # Errors
-    /// As there.
-    pub fn safe_step(
-        &self,
-        pixels_per_ray: PixelsPerRay,
-        target: f64,
-    ) -> Result<f64, PredictError> {
-        self.predictor
-            .safe_step(self.outlook, pixels_per_ray, target)
-    }
 }
 
 #[cfg(test)]

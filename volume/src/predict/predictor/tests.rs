@@ -9,6 +9,7 @@ fn outlook(angle: f64, lit_share: f64) -> Outlook {
         length: 8e6,
         longest: 1e7,
         lit_length: 8e6 * lit_share,
+        seen_length: 3e6 * lit_share,
         coarse_steps: 12.0,
     }
 }
