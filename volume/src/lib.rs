@@ -14,6 +14,9 @@
 //! | [`appearance`] | shading, surfaces, pre-integration |
 //! | [`cast`] | a picture of a volume |
 //! | [`estimate`] | how long rays will be, before they are cast |
+//! | [`predict`] | what a frame will take, before it is drawn |
+//! | [`steer`] | in which quality a frame takes a given time |
+//! | [`sequence`] | what is to be seen at each moment of a recording |
 #![forbid(unsafe_code)]
 
 pub mod appearance;
@@ -24,9 +27,12 @@ pub mod estimate;
 pub mod generate;
 pub mod grid;
 pub mod load;
+pub mod predict;
 pub mod presets;
+pub mod sequence;
 mod slabs;
 pub mod statistics;
+pub mod steer;
 mod table;
 pub mod transfer;
 pub mod view;
@@ -41,7 +47,10 @@ pub use crate::{
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},
+    predict::{FramePredictor, Outlook, PixelsPerRay, Prediction, PredictorParams, Quality},
+    sequence::Sequence,
     statistics::Statistics,
+    steer::{Mode, Next, Steering, SteeringParams, WorkClock},
     transfer::{ControlPoint, TransferError, TransferFunction},
     view::View,
 };

@@ -94,10 +94,21 @@ impl Histograms {
         let of_bin = self
             .bin_opacities(function)
             .map(|opacity| -(-opacity.min(MOST_OPACITY)).ln_1p());
+        self.means(&of_bin)
+    }
+
+    /// The share of voxels of which something is seen, of all blocks.
+    pub(crate) fn seen_shares(&self, function: &TransferFunction) -> Vec<f32> {
+        let is_seen = |opacity| f64::from(u8::from(opacity > 0.0));
+        self.means(&self.bin_opacities(function).map(is_seen))
+    }
+
+    /// The mean over the voxels of each block of what their bins have.
+    fn means(&self, of_bin: &[f64; VALUE_BINS]) -> Vec<f32> {
         let mean = |values: &[u16; VALUE_BINS]| {
             let pairs = values.iter().zip(of_bin);
-            let (sum, total) = pairs.fold((0.0, 0.0), |(sum, total), (&n, extinction)| {
-                (sum + f64::from(n) * extinction, total + f64::from(n))
+            let (sum, total) = pairs.fold((0.0, 0.0), |(sum, total), (&n, value)| {
+                (sum + f64::from(n) * value, total + f64::from(n))
             });
             if total > 0.0 {
                 (sum / total) as f32
@@ -286,6 +297,8 @@ mod tests {
         // The last bin holds opacities from 0.4844 to 0.5.
         let expected = -(1.0_f32 - 0.492_187_5).ln();
         assert!(extinctions[0] == 0.0 && (extinctions[1] - expected * 8.0 / 17.0).abs() < 1e-6);
+        let seen = histograms.seen_shares(&ramp());
+        assert!(seen[0] == 0.0 && (seen[1] - 8.0 / 17.0).abs() < 1e-6);
         // With the values turned round, what was 0 is 128.
         let turned = self::histograms(-1.0).extinctions(&ramp());
         assert!((turned[0] - expected).abs() < 1e-6, "{turned:?}");

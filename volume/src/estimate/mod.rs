@@ -66,6 +66,10 @@ pub struct EstimatedRay {
     pub back: f32,
     /// Number of the sample at which it is expected to end.
     pub end: f32,
+    /// Expected number of samples in blocks in which something can be seen.
+    pub lit: f32,
+    /// Expected number of samples of which something is seen.
+    pub seen: f32,
 }
 
 impl EstimatedRay {
@@ -83,6 +87,8 @@ pub struct Estimate {
     pub tiles: [u32; 2],
     /// The ray through the middle of each square, row by row.
     pub rays: Vec<EstimatedRay>,
+    /// How many of them meet the box of the volume.
+    pub in_box: u32,
     /// Blocks and draws that were looked at: what the estimate took.
     pub steps: u64,
 }
@@ -115,6 +121,8 @@ pub struct PreparedEstimate<'a> {
     dims: [usize; 3],
     lit: Vec<bool>,
     medium: Medium,
+    /// Share of the voxels of each block of which something is seen.
+    seen_shares: Vec<f32>,
 }
 
 #[derive(Clone, Debug)]
@@ -157,6 +165,7 @@ impl<'a> Estimator<'a> {
             volume: self.volume,
             dims: self.blocks.dims,
             lit: self.blocks.lit(&baked).collect(),
+            seen_shares: self.histograms.seen_shares(function),
             medium: match method {
                 EstimateMethod::PaperLinear => drawn(Cut::Linear),
                 EstimateMethod::CubeRoot => drawn(Cut::CubeRoot),
@@ -202,6 +211,8 @@ impl PreparedEstimate<'_> {
         Ok(Estimate {
             tiles,
             rays,
+            // A ray that meets the box passes at least one block.
+            in_box: steps.iter().filter(|&&steps| steps > 0).count() as u32,
             steps: steps.iter().sum(),
         })
     }
@@ -222,6 +233,7 @@ impl March<'_> {
         let mut steps = 0;
         let (mut front, mut back) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut depth, mut end) = (0.0, f32::INFINITY);
+        let (mut lit, mut seen) = (0.0, 0.0);
         // What a ray has to pass to be as opaque as the threshold.
         let most_depth = -(-self.termination.min(1.0)).ln_1p();
         self.pieces(step, first, last, |piece| {
@@ -240,6 +252,9 @@ impl March<'_> {
                 }
                 depth += more;
             }
+            let samples = (piece.end.min(end) - piece.start).max(0.0);
+            lit += samples;
+            seen += samples * self.prepared.seen_shares[piece.block];
         });
         if front >= back {
             return (EstimatedRay::default(), steps);
@@ -259,6 +274,10 @@ impl March<'_> {
                 k = next;
                 if opacity > self.termination {
                     end = k;
+                    // As much of what is left as of the whole.
+                    let share = (end - front) / (back - front);
+                    lit *= share;
+                    seen *= share;
                     break;
                 }
             }
@@ -267,6 +286,8 @@ impl March<'_> {
             front,
             back,
             end: end.min(back),
+            lit,
+            seen,
         };
         (ray, steps)
     }

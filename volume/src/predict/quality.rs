@@ -1,0 +1,62 @@
+//! What may be given up for time: samples along a ray, and rays.
+//!
+//! Invariant of the order: with the same picture, time falls as [`Quality::coarseness`] rises, as far
+//! as it depends on samples alone.
+
+use serde::{Deserialize, Serialize};
+
+/// Pixels for which one ray is cast.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum PixelsPerRay {
+    /// A ray for every pixel.
+    #[default]
+    One,
+    /// A ray for every second pixel, like the black fields of a checkerboard.
+    Checker,
+    /// A ray for four pixels, two by two.
+    Four,
+}
+
+impl PixelsPerRay {
+    /// All of them, finest first.
+    pub const ALL: [Self; 3] = [Self::One, Self::Checker, Self::Four];
+
+    /// How many pixels share a ray.
+    #[must_use]
+    pub fn count(self) -> f64 {
+        match self {
+            Self::One => 1.0,
+            Self::Checker => 2.0,
+            Self::Four => 4.0,
+        }
+    }
+}
+
+/// How finely a frame is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Distance between samples, in lengths of a voxel; above 0.
+    pub step: f64,
+    /// Pixels for which one ray is cast.
+    pub pixels_per_ray: PixelsPerRay,
+}
+
+impl Quality {
+    /// A ray for every pixel, with samples at a distance of `step` lengths of a voxel.
+    #[must_use]
+    pub fn with_step(step: f64) -> Self {
+        Self {
+            step,
+            pixels_per_ray: PixelsPerRay::One,
+        }
+    }
+
+    /// Voxel lengths times pixels for which a sample stands.
+    #[must_use]
+    pub fn coarseness(self) -> f64 {
+        self.step * self.pixels_per_ray.count()
+    }
+}
