@@ -19,11 +19,9 @@
 //! Invariants: the frame is computed in f64 and rounded once, so that a camera far from the origin
 //! of the scene loses nothing; every direction is a unit vector up to rounding.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-/// Smallest sine of the angle between `up` and the direction of view. Unit vectors rounded to f32
-/// are off by about 6e-8: closer than a few of these, the frame would be made of rounding errors.
-const MIN_UP_SINE: f64 = 1e-6;
+use crate::picture_frame::{Axes, Bundle, PictureFrame};
 
 /// Where a picture is taken from, and how much of the scene it shows.
 ///
@@ -75,6 +73,12 @@ pub enum CameraError {
         /// The value given.
         degrees: f32,
     },
+    /// The height of an orthographic picture is not above 0 and finite.
+    #[error("an orthographic picture {height} high: its height must be above 0 and finite")]
+    PictureHeight {
+        /// The value given, scene units.
+        height: f32,
+    },
     /// The picture has no pixels.
     #[error("a picture of {width} x {height} pixels has nothing to project onto")]
     EmptyPicture {
@@ -83,13 +87,6 @@ pub enum CameraError {
         /// Height asked for, pixels.
         height: u32,
     },
-}
-
-/// Orthonormal right-handed frame of a camera: right × up = −forward.
-struct Frame {
-    forward: DVec3,
-    right: DVec3,
-    up: DVec3,
 }
 
 impl Camera {
@@ -121,7 +118,7 @@ impl Camera {
     /// The first fault found: a coordinate that is not finite, a target at the origin, an `up`
     /// that is zero or along the view, a field of view outside (0, 180) degrees.
     pub fn validate(&self) -> Result<(), CameraError> {
-        self.frame().map(|_| ())
+        self.axes().map(|_| ())
     }
 
     /// The projection onto a picture of `width` × `height` square pixels.
@@ -130,63 +127,44 @@ impl Camera {
     ///
     /// As [`Camera::validate`], and [`CameraError::EmptyPicture`] if either side is zero.
     pub fn projection(&self, width: u32, height: u32) -> Result<Projection, CameraError> {
-        let frame = self.frame()?;
-        if width == 0 || height == 0 {
-            return Err(CameraError::EmptyPicture { width, height });
-        }
-        // The tangent of the platform's library may differ in its last bit of f64; what is left of
-        // that after rounding to f32 is nothing, save in one case of about 2^28.
-        let half_fov = f64::from(self.vertical_fov_degrees).to_radians() * 0.5;
-        let pixel_side = 2.0 * half_fov.tan() / f64::from(height);
+        let frame = self.picture_frame(width, height)?;
         Ok(Projection {
             origin: self.origin,
             forward: frame.forward.as_vec3(),
-            right_per_pixel: (frame.right * pixel_side).as_vec3(),
-            down_per_pixel: (frame.up * -pixel_side).as_vec3(),
-            centre_x: (f64::from(width) * 0.5) as f32,
-            centre_y: (f64::from(height) * 0.5) as f32,
+            right_per_pixel: frame.right_per_pixel.as_vec3(),
+            down_per_pixel: frame.down_per_pixel.as_vec3(),
+            centre_x: frame.centre[0] as f32,
+            centre_y: frame.centre[1] as f32,
         })
     }
 
-    fn frame(&self) -> Result<Frame, CameraError> {
-        let points = [
-            ("origin", self.origin),
-            ("target", self.target),
-            ("up", self.up),
-        ];
-        for (field, value) in points {
-            if !value.is_finite() {
-                return Err(CameraError::NotFinite { field, value });
-            }
-        }
-        if self.origin == self.target {
-            return Err(CameraError::TargetIsOrigin {
-                origin: self.origin,
-            });
-        }
+    /// The rays of a picture of `width` × `height` square pixels before they are rounded to f32.
+    ///
+    /// # Errors
+    ///
+    /// As [`Camera::projection`].
+    pub fn picture_frame(&self, width: u32, height: u32) -> Result<PictureFrame, CameraError> {
+        let axes = self.axes()?;
+        // The tangent of the platform's library may differ in its last bit of f64; what is left of
+        // that after rounding to f32 is nothing, save in one case of about 2^28.
+        let half_fov = f64::from(self.vertical_fov_degrees).to_radians() * 0.5;
+        axes.picture(
+            self.origin,
+            2.0 * half_fov.tan(),
+            Bundle::FromPoint,
+            [width, height],
+        )
+    }
+
+    fn axes(&self) -> Result<Axes, CameraError> {
+        let axes = Axes::new(self.origin, self.target, self.up)?;
         // A NaN lies in no interval, so it is refused here as well.
         if !(self.vertical_fov_degrees > 0.0 && self.vertical_fov_degrees < 180.0) {
             return Err(CameraError::FieldOfView {
                 degrees: self.vertical_fov_degrees,
             });
         }
-        // In f64 neither the difference of two finite f32 nor the square of any overflows or
-        // vanishes, so both vectors below are units.
-        let forward = (self.target.as_dvec3() - self.origin.as_dvec3()).normalize();
-        let up = self.up.as_dvec3().normalize_or_zero();
-        let right = forward.cross(up);
-        if right.length() < MIN_UP_SINE {
-            return Err(CameraError::UpAlongView {
-                up: self.up,
-                view: forward.as_vec3(),
-            });
-        }
-        let right = right.normalize();
-        Ok(Frame {
-            forward,
-            right,
-            up: right.cross(forward),
-        })
+        Ok(axes)
     }
 }
 
@@ -209,19 +187,6 @@ impl Projection {
     #[inline]
     pub fn origin(&self) -> Vec3 {
         self.origin
-    }
-
-    /// What [`Projection::direction`] adds up before it is made a unit: the direction to the centre
-    /// of the picture, and the steps for one pixel to the right and downwards.
-    #[inline]
-    pub fn frame(&self) -> [Vec3; 3] {
-        [self.forward, self.right_per_pixel, self.down_per_pixel]
-    }
-
-    /// Picture coordinates of the point looked at.
-    #[inline]
-    pub fn centre(&self) -> [f32; 2] {
-        [self.centre_x, self.centre_y]
     }
 
     /// Unit direction of the ray through the picture point (`px`, `py`), pixels, (0, 0) being the

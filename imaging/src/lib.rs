@@ -2,7 +2,7 @@
 //!
 //! | module | what it answers |
 //! | --- | --- |
-//! | [`camera`] | which ray belongs to a point of the picture |
+//! | [`camera`], [`orthographic`], [`picture_frame`] | which ray belongs to a point of the picture |
 //! | [`sampler`] | which number decides a question of a path |
 //! | [`film`] | what is known of a pixel after n samples, and how well |
 //! | [`tiles`] | which thread renders which pixels, and when to stop |
@@ -48,6 +48,8 @@ pub mod camera;
 pub mod files;
 pub mod film;
 pub mod image;
+pub mod orthographic;
+pub mod picture_frame;
 pub mod sampler;
 pub mod tiles;
 pub mod tone;
@@ -58,6 +60,8 @@ pub use crate::files::{
 };
 pub use crate::film::{Film, FilmError, Pixel};
 pub use crate::image::Image;
+pub use crate::orthographic::{AnyCamera, OrthographicCamera};
+pub use crate::picture_frame::{Bundle, PictureFrame};
 pub use crate::sampler::{PixelSampler, dimension};
 pub use crate::tiles::{CancelToken, Completion, Progress, Tile, TileLoop, TileView};
 pub use crate::tone::{Display, ToneCurve};
