@@ -42,7 +42,7 @@ pub use crate::{
     appearance::{
         Appearance, AppearanceError, Integration, Interpolation, IsoSurface, Light, Shading,
     },
-    cast::{Behind, CastError, CastOptions, Picture, Prepared, Raycaster, Skipping, Work},
+    cast::{Behind, CastError, CastOptions, Jitter, Picture, Prepared, Raycaster, Skipping, Work},
     estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},

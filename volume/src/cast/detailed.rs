@@ -155,7 +155,7 @@ impl<V: Voxel> TileKernel<'_, V> {
         details: &Details,
     ) {
         let frame = self.frame;
-        let field = Field::<N, L, V>::new(frame.volume, &frame.view, self.voxels);
+        let shape = Field::<N, L, V>::new(frame.volume, &frame.view, self.voxels);
         let needs_front = details.needs_front();
         let is_whole = !(needs_front && frame.volume.missing() > 0);
         let map = frame.distances.filter(|_| is_whole);
@@ -172,6 +172,7 @@ impl<V: Voxel> TileKernel<'_, V> {
             if lanes.are_idle() {
                 break;
             }
+            let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),
                 L::load(&lanes.step[1]),

@@ -75,13 +75,7 @@ impl Shade {
     }
 
     /// The colour of what is lit at a place.
-    fn of(
-        &self,
-        samples: &Samples<'_>,
-        colour: [f32; 3],
-        place: [f32; 3],
-        step: [f32; 3],
-    ) -> [f32; 3] {
+    fn of(&self, samples: &Samples<'_>, colour: [f32; 3], place: [f32; 3]) -> [f32; 3] {
         let gradient: [f32; 3] = std::array::from_fn(|axis| {
             let beside = |offset: f32| {
                 let mut beside = place;
@@ -97,7 +91,8 @@ impl Shade {
             return colour;
         }
         let length = square.sqrt();
-        let direction: [f32; 3] = std::array::from_fn(|axis| step[axis] * self.per_step[axis]);
+        let direction: [f32; 3] =
+            std::array::from_fn(|axis| samples.lattice.step[axis] * self.per_step[axis]);
         let (straight, mirrored) = match self.light {
             None => {
                 let straight = (dot(gradient, direction) / length).abs();
@@ -168,17 +163,16 @@ impl Details {
         &self,
         samples: &Samples<'_>,
         ray: &mut RayResult,
-        step: [f32; 3],
         k: f32,
         [front, back]: [f32; 2],
     ) {
-        let place = samples.place(k, step);
+        let place = samples.place(k);
         let shaded = |colour, place| match &self.shade {
-            Some(shade) => shade.of(samples, colour, place, step),
+            Some(shade) => shade.of(samples, colour, place),
             None => colour,
         };
         let mut cross = |surface: &RawSurface| {
-            let place = self.crossing(samples, step, k, [front, back], surface.raw);
+            let place = self.crossing(samples, k, [front, back], surface.raw);
             add(ray, surface.opacity, shaded(surface.colour, place));
         };
         for surface in &self.surfaces {
@@ -212,7 +206,6 @@ impl Details {
     fn crossing(
         &self,
         samples: &Samples<'_>,
-        step: [f32; 3],
         k: f32,
         [front, back]: [f32; 2],
         raw: f32,
@@ -224,13 +217,13 @@ impl Details {
             if turn == SURFACE_TURNS {
                 break;
             }
-            let value = samples.value(samples.place(k - 1.0 + share, step));
+            let value = samples.value(samples.place(k - 1.0 + share));
             if (value < raw) == (front < raw) {
                 near = (share, value);
             } else {
                 far = (share, value);
             }
         }
-        samples.place(k - 1.0 + share, step)
+        samples.place(k - 1.0 + share)
     }
 }

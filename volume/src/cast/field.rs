@@ -117,7 +117,8 @@ impl Voxel for f32 {
 #[derive(Clone, Copy)]
 pub(crate) struct Field<'a, const N: usize, L: GatherLanes<N>, V> {
     voxels: &'a [V],
-    eye: [L; 3],
+    /// Where sample 0 of the rays lies.
+    origin: [L; 3],
     /// The last voxel: samples are moved onto it.
     top: [L; 3],
     last_cell: [L::Int; 3],
@@ -137,7 +138,7 @@ impl<'a, const N: usize, L: GatherLanes<N>, V: Voxel> Field<'a, N, L, V> {
         let last_cell = dims.map(|n| n.saturating_sub(2) as i32);
         Self {
             voxels,
-            eye: splat_all::<N, L>(view.eye),
+            origin: splat_all::<N, L>([0.0; 3]),
             top: splat_all::<N, L>(view.last_voxel),
             last_cell: [
                 L::splat_int(last_cell[0]),
@@ -152,12 +153,19 @@ impl<'a, const N: usize, L: GatherLanes<N>, V: Voxel> Field<'a, N, L, V> {
         }
     }
 
+    /// The field as rays from there see it.
+    #[inline(always)]
+    pub(crate) fn seen_from(mut self, origin: [L; 3]) -> Self {
+        self.origin = origin;
+        self
+    }
+
     /// Where sample `k` of rays lies, in voxels.
     #[inline(always)]
     pub(crate) fn place(&self, k: L, step: &[L; 3]) -> [L; 3] {
         let mut place = *step;
         for axis in 0..3 {
-            place[axis] = self.limited(axis, k.mul(step[axis]).add(self.eye[axis]));
+            place[axis] = self.limited(axis, k.mul(step[axis]).add(self.origin[axis]));
         }
         place
     }

@@ -15,7 +15,7 @@ use super::{
     field::{Field, Voxel},
     lanes::{LaneStates, Waiting},
     space::Space,
-    view::SMALLEST_STEP,
+    view::{NearRays, RayLattice, Rays, SMALLEST_STEP},
 };
 use crate::table::TransferTable;
 
@@ -57,25 +57,33 @@ impl<V: Voxel> TileKernel<'_, V> {
     #[inline(always)]
     fn set_up<const N: usize, L: GatherLanes<N>>(&self, waiting: &mut Vec<Waiting>) {
         const SIDE: u32 = 4;
+        let view = &self.frame.view;
         let (width, height) = (self.columns.len() as u32, self.rows.len() as u32);
         let lanes_down = N as u32 / SIDE;
+        let mut rays = [RayLattice::NONE; N];
         for y in (0..height).step_by(lanes_down as usize) {
             for x in (0..width).step_by(SIDE as usize) {
-                let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
+                let (mut xs, mut ys, mut jitter) = ([0.0; N], [0.0; N], [0.0; N]);
                 for lane in 0..N as u32 {
-                    xs[lane as usize] = (self.columns.start + x + lane % SIDE) as f32 + 0.5;
-                    ys[lane as usize] = (self.rows.start + y + lane / SIDE) as f32 + 0.5;
+                    let column = self.columns.start + x + lane % SIDE;
+                    let row = self.rows.start + y + lane / SIDE;
+                    xs[lane as usize] = column as f32 + 0.5;
+                    ys[lane as usize] = row as f32 + 0.5;
+                    jitter[lane as usize] = view.jitter_of(column, row);
                 }
-                let (steps, first, last) = self.lattice::<N, L>(L::load(&xs), L::load(&ys));
-                let (first, last) = (first.store(), last.store());
-                let steps = [steps[0].store(), steps[1].store(), steps[2].store()];
-                for lane in 0..N {
+                match &view.rays {
+                    Rays::Near(near) => self.lattice::<N, L>(near, xs, ys, jitter, &mut rays),
+                    Rays::Exact(exact) => {
+                        for (lane, ray) in rays.iter_mut().enumerate() {
+                            *ray = exact.lattice(view, xs[lane], ys[lane], jitter[lane]);
+                        }
+                    }
+                }
+                for (lane, samples) in rays.iter().enumerate() {
                     let (x, y) = (x + lane as u32 % SIDE, y + lane as u32 / SIDE);
-                    if x < width && y < height && first[lane] <= last[lane] {
+                    if x < width && y < height && samples.first <= samples.last {
                         waiting.push(Waiting {
-                            step: [steps[0][lane], steps[1][lane], steps[2][lane]],
-                            first: first[lane],
-                            last: last[lane],
+                            samples: *samples,
                             pixel: y * width + x,
                         });
                     }
@@ -84,36 +92,60 @@ impl<V: Voxel> TileKernel<'_, V> {
         }
     }
 
+    /// The rays through points of the picture, moved by a share of a step.
     #[inline(always)]
-    fn lattice<const N: usize, L: GatherLanes<N>>(&self, x: L, y: L) -> ([L; 3], L, L) {
+    fn lattice<const N: usize, L: GatherLanes<N>>(
+        &self,
+        near: &NearRays,
+        x: [f32; N],
+        y: [f32; N],
+        jitter: [f32; N],
+        rays: &mut [RayLattice; N],
+    ) {
         let view = &self.frame.view;
-        let across = x.sub(L::splat(view.centre[0]));
-        let down = y.sub(L::splat(view.centre[1]));
+        let across = L::load(&x).sub(L::splat(near.centre[0]));
+        let down = L::load(&y).sub(L::splat(near.centre[1]));
+        let jitter = L::load(&jitter);
         let mut d = [across; 3];
         for (axis, d) in d.iter_mut().enumerate() {
-            let forward = L::splat(view.frame[0][axis]);
-            let right = L::splat(view.frame[1][axis]).mul(across);
-            let below = L::splat(view.frame[2][axis]).mul(down);
+            let forward = L::splat(near.frame[0][axis]);
+            let right = L::splat(near.frame[1][axis]).mul(across);
+            let below = L::splat(near.frame[2][axis]).mul(down);
             *d = forward.add(right).add(below);
         }
         let square = d[0].mul(d[0]).add(d[1].mul(d[1])).add(d[2].mul(d[2]));
         let unit = L::splat(1.0).div(square.sqrt());
-        let (mut first, mut last) = (L::splat(1.0), L::splat(view.last_sample));
-        let mut steps = d;
-        for (axis, step) in steps.iter_mut().enumerate() {
-            *step = step.mul(unit).mul(L::splat(view.scale[axis]));
-            let eye = L::splat(view.eye[axis]);
+        let (first_sample, last_sample) =
+            (L::splat(view.first_sample()), L::splat(view.last_sample));
+        let (mut first, mut last) = (first_sample, last_sample);
+        let (mut origins, mut steps) = (d, d);
+        for axis in 0..3 {
+            let step = d[axis].mul(unit).mul(L::splat(near.scale[axis]));
+            let origin = L::splat(near.eye[axis]).add(jitter.mul(step));
+            let (low, high) = (L::splat(view.low[axis]), L::splat(view.high[axis]));
             let is_still = step.abs().lt(L::splat(SMALLEST_STEP));
-            let reciprocal = L::splat(1.0).div(*step);
-            let a = L::splat(view.low[axis]).sub(eye).mul(reciprocal);
-            let b = L::splat(view.high[axis]).sub(eye).mul(reciprocal);
-            let inside = (view.low[axis]..=view.high[axis]).contains(&view.eye[axis]);
-            let still_last = L::splat(if inside { view.last_sample } else { -1.0 });
-            first = first.max(L::select(is_still, L::splat(1.0), a.min(b)));
+            let reciprocal = L::splat(1.0).div(step);
+            let a = low.sub(origin).mul(reciprocal);
+            let b = high.sub(origin).mul(reciprocal);
+            let is_inside = low.le(origin) & origin.le(high);
+            let still_last = L::select(is_inside, last_sample, L::splat(-1.0));
+            first = first.max(L::select(is_still, first_sample, a.min(b)));
             last = last.min(L::select(is_still, still_last, a.max(b)));
+            (origins[axis], steps[axis]) = (origin, step);
         }
         let zero = L::splat(0.0);
-        (steps, zero.sub(zero.sub(first).floor()), last.floor())
+        let first = zero.sub(zero.sub(first).floor()).store();
+        let last = last.floor().store();
+        let [origins, steps] = [origins, steps].map(|v| [v[0].store(), v[1].store(), v[2].store()]);
+        for lane in 0..N {
+            rays[lane] = RayLattice {
+                origin: [origins[0][lane], origins[1][lane], origins[2][lane]],
+                step: [steps[0][lane], steps[1][lane], steps[2][lane]],
+                first: first[lane],
+                last: last[lane],
+                number: 0.0,
+            };
+        }
     }
 
     #[inline(always)]
@@ -126,7 +158,7 @@ impl<V: Voxel> TileKernel<'_, V> {
             distances,
             ..
         } = self.frame;
-        let field = Field::<N, L, V>::new(volume, view, self.voxels);
+        let shape = Field::<N, L, V>::new(volume, view, self.voxels);
         let space = distances.map(|map| Space::<N, L>::new(map, view.border));
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let look = Look::<N, L>::new(table, V::IS_WHOLE);
@@ -141,6 +173,7 @@ impl<V: Voxel> TileKernel<'_, V> {
             if lanes.are_idle() {
                 break;
             }
+            let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),
                 L::load(&lanes.step[1]),

@@ -1,13 +1,13 @@
 //! The rays that wait for lanes and those that are in them, between two loops.
 
-use super::RayResult;
+use raywright_bvh::simd::GatherLanes;
+
+use super::{RayResult, view::RayLattice};
 
 /// A ray that waits for a lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Waiting {
-    pub(crate) step: [f32; 3],
-    pub(crate) first: f32,
-    pub(crate) last: f32,
+    pub(crate) samples: RayLattice,
     pub(crate) pixel: u32,
 }
 
@@ -15,6 +15,8 @@ const NO_PIXEL: u32 = u32::MAX;
 
 /// The rays in the lanes between two loops.
 pub(crate) struct LaneStates<const N: usize> {
+    origin: [[f32; N]; 3],
+    number: [f32; N],
     pub(crate) step: [[f32; N]; 3],
     pub(crate) k: [f32; N],
     pub(crate) last: [f32; N],
@@ -29,6 +31,8 @@ impl<const N: usize> LaneStates<N> {
     #[inline(always)]
     pub(crate) fn idle() -> Self {
         Self {
+            origin: [[0.0; N]; 3],
+            number: [0.0; N],
             step: [[1.0; N]; 3],
             k: [0.0; N],
             last: [-1.0; N],
@@ -62,6 +66,13 @@ impl<const N: usize> LaneStates<N> {
         }
     }
 
+    /// Where sample 0 of each ray lies, in voxels.
+    #[inline(always)]
+    pub(crate) fn origins<L: GatherLanes<N>>(&self) -> [L; 3] {
+        let [x, y, z] = &self.origin;
+        [L::load(x), L::load(y), L::load(z)]
+    }
+
     /// Whether no lane has a ray.
     #[inline(always)]
     pub(crate) fn are_idle(&self) -> bool {
@@ -70,14 +81,17 @@ impl<const N: usize> LaneStates<N> {
 
     #[inline(always)]
     fn take(&mut self, lane: usize, ray: &Waiting) {
+        let samples = &ray.samples;
         for axis in 0..3 {
-            self.step[axis][lane] = ray.step[axis];
+            self.origin[axis][lane] = samples.origin[axis];
+            self.step[axis][lane] = samples.step[axis];
             self.colour[axis][lane] = 0.0;
         }
         self.opacity[lane] = 0.0;
         self.front[lane] = f32::NAN;
-        self.k[lane] = ray.first;
-        self.last[lane] = ray.last;
+        self.number[lane] = samples.number;
+        self.k[lane] = samples.first;
+        self.last[lane] = samples.last;
         self.pixel[lane] = ray.pixel;
     }
 
@@ -90,7 +104,7 @@ impl<const N: usize> LaneStates<N> {
                 self.colour[2][lane],
             ],
             opacity: self.opacity[lane],
-            end: self.last[lane] + 1.0,
+            end: self.last[lane] + 1.0 + self.number[lane],
         }
     }
 }

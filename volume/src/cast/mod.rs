@@ -15,7 +15,7 @@ mod space;
 mod tiles;
 pub(crate) mod view;
 
-use raywright_imaging::{Camera, Image};
+use raywright_imaging::{AnyCamera, Image};
 
 use crate::{
     appearance::{Appearance, AppearanceError, Integration, IsoSurface},
@@ -28,7 +28,7 @@ use crate::{
 };
 use details::{Details, RawSurface};
 use field::Layout;
-pub use options::{Behind, CastError, CastOptions, Skipping};
+pub use options::{Behind, CastError, CastOptions, Jitter, Skipping};
 pub use picture::{Picture, Work};
 use tiles::cast_tiles;
 use view::View;
@@ -93,15 +93,9 @@ impl<'a> Raycaster<'a> {
     /// bits and four for each of 16, and finds the bounds of its blocks.
     ///
     /// # Errors
-    /// [`CastError::TooLarge`].
+    /// [`CastError::TooLarge`], [`CastError::TooLong`], before any memory is taken.
     pub fn new(volume: &'a Volume) -> Result<Self, CastError> {
-        let limit = i32::MAX as usize - 8;
-        if volume.len() > limit {
-            return Err(CastError::TooLarge {
-                voxels: volume.len(),
-                limit,
-            });
-        }
+        check_size(volume.dims(), volume.len())?;
         Ok(Self {
             volume,
             layout: Layout::of(volume),
@@ -162,11 +156,30 @@ impl<'a> Raycaster<'a> {
     pub fn render(
         &self,
         function: &TransferFunction,
-        camera: &Camera,
+        camera: impl Into<AnyCamera>,
         size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
         self.prepare(function).render(camera, size, options)
+    }
+}
+
+/// Whether a volume of `dims` sizes, `voxels` in all, can be cast.
+fn check_size(dims: [usize; 3], voxels: usize) -> Result<(), CastError> {
+    // What is read behind the last voxel must have an index too.
+    let limit = i32::MAX as usize - 8;
+    if voxels > limit {
+        return Err(CastError::TooLarge { voxels, limit });
+    }
+    // Floats near 2^20 are 1/16 apart.
+    let limit = 1 << 20;
+    match dims.iter().position(|&size| size > limit) {
+        Some(axis) => Err(CastError::TooLong {
+            axis,
+            size: dims[axis],
+            limit,
+        }),
+        None => Ok(()),
     }
 }
 
@@ -188,11 +201,11 @@ impl Prepared<'_> {
     /// [`CastError`] if the camera, the size or an option has no meaning.
     pub fn render(
         &self,
-        camera: &Camera,
+        camera: impl Into<AnyCamera>,
         size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
-        self.picture(camera, size, options, |frame, picture| {
+        self.picture(camera.into(), size, options, |frame, picture| {
             cast_tiles(frame, picture, options.isa);
         })
     }
@@ -204,11 +217,11 @@ impl Prepared<'_> {
     /// As [`Prepared::render`].
     pub fn render_slowly(
         &self,
-        camera: &Camera,
+        camera: impl Into<AnyCamera>,
         size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
-        self.picture(camera, size, options, |frame, picture| {
+        self.picture(camera.into(), size, options, |frame, picture| {
             for y in 0..size[1] {
                 for x in 0..size[0] {
                     let result = reference::cast(frame, x, y);
@@ -224,21 +237,23 @@ impl Prepared<'_> {
 
     fn picture(
         &self,
-        camera: &Camera,
+        camera: AnyCamera,
         [width, height]: [u32; 2],
         options: &CastOptions,
         cast: impl FnOnce(&Frame<'_>, &mut Picture),
     ) -> Result<Picture, CastError> {
         options.check()?;
         let Raycaster { volume, layout, .. } = self.caster;
-        let projection = camera.projection(width, height)?;
+        let rays = camera.picture_frame(width, height)?;
+        let clip = options.clip.as_ref();
+        let view = View::new(volume, &rays, options.step, clip, options.jitter)?;
         let image = Image::new(width, height)?;
         let pixels = image.pixels().len();
-        let step = options.step * volume.unit_length();
         let mut picture = Picture {
             image,
             opacity: vec![0.0; pixels],
             end: vec![0.0; pixels],
+            base: view.base(),
             work: Work::default(),
         };
         let is_plain = self.appearance.is_plain();
@@ -248,7 +263,7 @@ impl Prepared<'_> {
         let frame = Frame {
             volume,
             layout,
-            view: View::new(volume, &projection, step, options.clip.as_ref()),
+            view,
             table: &self.baked.table(options.step),
             termination: options.termination,
             behind: options.behind,

@@ -18,6 +18,8 @@ pub struct CastOptions {
     pub clip: Option<Aabb>,
     /// How empty space is left out. Changes no pixel.
     pub skipping: Skipping,
+    /// Whether samples are moved along their rays.
+    pub jitter: Jitter,
     /// The instruction set. Changes no pixel.
     pub isa: Isa,
 }
@@ -30,6 +32,7 @@ impl Default for CastOptions {
             behind: Behind::TheSame,
             clip: None,
             skipping: Skipping::Distance,
+            jitter: Jitter::None,
             isa: Isa::best(),
         }
     }
@@ -78,6 +81,17 @@ pub enum Skipping {
     Distance,
 }
 
+/// Whether samples are moved along their rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Jitter {
+    /// They lie at whole steps from the eye, or from the plane through an orthographic one.
+    None,
+    /// The samples of each pixel lie farther away by the same share of a step, from 0 to 1, which is
+    /// a hash of the pixel: rings become noise.
+    PerPixel,
+}
+
 /// Why there is no picture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -107,6 +121,36 @@ pub enum CastError {
         min: Vec3,
         /// Its upper corner.
         max: Vec3,
+    },
+    /// The camera is so far away that double precision cannot place samples.
+    #[error("a camera {distance:e} voxels away: at most {limit:e} can be told apart")]
+    TooFar {
+        /// How far it is along one axis, in distances between voxels.
+        distance: f64,
+        /// How far it may be.
+        limit: f64,
+    },
+    /// The step is so small that the samples across the volume cannot be counted.
+    #[error(
+        "a step that takes {samples:e} samples across the volume: at most {limit:e} are counted"
+    )]
+    TooManySamples {
+        /// How many samples the diagonal has.
+        samples: f64,
+        /// How many it may have.
+        limit: f64,
+    },
+    /// A side of the volume is so long that samples cannot be placed between voxels.
+    #[error(
+        "{size} voxels along axis {axis} are more than the {limit} between which samples are placed"
+    )]
+    TooLong {
+        /// 0, 1 or 2 for x, y or z.
+        axis: usize,
+        /// Voxels along it.
+        size: usize,
+        /// How many there may be.
+        limit: usize,
     },
     /// The volume has more voxels than lanes can index.
     #[error("{voxels} voxels are more than the {limit} that can be indexed")]

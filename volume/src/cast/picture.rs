@@ -33,9 +33,13 @@ pub struct Picture {
     pub image: Image,
     /// Opacity of each pixel, row by row.
     pub opacity: Vec<f32>,
-    /// For each pixel, the number of the sample behind the last one that was looked at, as the
-    /// distance from the eye in steps; 0 where the ray has none.
+    /// For each pixel, the number of the sample behind the last one that was looked at; 0 where the
+    /// ray has none. With `base` it is the distance from the eye, or from the plane through an
+    /// orthographic one, in steps.
     pub end: Vec<f32>,
+    /// The number of the sample from which numbers in `end` count: 0 unless the camera is far from
+    /// the volume or orthographic.
+    pub base: f64,
     /// What it took.
     pub work: Work,
 }

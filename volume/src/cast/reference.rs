@@ -2,27 +2,29 @@
 
 use super::{
     Frame, RayResult,
-    view::{SMALLEST_STEP, View},
+    view::{RayLattice, Rays, SMALLEST_STEP, View},
 };
 use crate::{appearance::Interpolation, grid::Volume, table::TransferTable};
 
 /// Casts the ray through the centre of a pixel.
 pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
-    let (step, first, last) = lattice(&frame.view, x as f32 + 0.5, y as f32 + 0.5);
+    let view = &frame.view;
+    let lattice = lattice(view, x as f32 + 0.5, y as f32 + 0.5, view.jitter_of(x, y));
     let samples = Samples {
         volume: frame.volume,
-        view: &frame.view,
+        lattice: &lattice,
+        view,
         table: frame.table,
         interpolation: frame
             .details
             .map_or(Interpolation::Trilinear, |d| d.interpolation),
     };
     let mut ray = RayResult::NOTHING;
-    let (mut k, mut front) = (first, f32::NAN);
-    while k <= last {
-        let value = samples.value(samples.place(k, step));
+    let (mut k, mut front) = (lattice.first, f32::NAN);
+    while k <= lattice.last {
+        let value = samples.value(samples.place(k));
         match frame.details {
-            Some(details) => details.look(&samples, &mut ray, step, k, [front, value]),
+            Some(details) => details.look(&samples, &mut ray, k, [front, value]),
             None if value.is_nan() => {}
             None => {
                 let entry = frame.table.index.of(value);
@@ -32,7 +34,7 @@ pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
         }
         front = value;
         k += 1.0;
-        ray.end = k;
+        ray.end = k + lattice.number;
         if ray.opacity > frame.termination {
             break;
         }
@@ -49,37 +51,47 @@ pub(crate) fn add(ray: &mut RayResult, opacity: f32, colour: [f32; 3]) {
     ray.opacity += weight;
 }
 
-/// The step of the ray through a point of the picture, in voxels, and its first and last sample.
-pub(crate) fn lattice(view: &View, x: f32, y: f32) -> ([f32; 3], f32, f32) {
-    let across = x - view.centre[0];
-    let down = y - view.centre[1];
-    let [forward, right, below] = view.frame;
+/// The samples of the ray through a point of the picture, moved by a share of a step.
+pub(crate) fn lattice(view: &View, x: f32, y: f32, jitter: f32) -> RayLattice {
+    let rays = match &view.rays {
+        Rays::Near(rays) => rays,
+        Rays::Exact(rays) => return rays.lattice(view, x, y, jitter),
+    };
+    let across = x - rays.centre[0];
+    let down = y - rays.centre[1];
+    let [forward, right, below] = rays.frame;
     let d: [f32; 3] = std::array::from_fn(|i| forward[i] + right[i] * across + below[i] * down);
     let unit = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-    let step = std::array::from_fn(|axis| d[axis] * unit * view.scale[axis]);
-    let (mut first, mut last) = (1.0_f32, view.last_sample);
+    let step: [f32; 3] = std::array::from_fn(|axis| d[axis] * unit * rays.scale[axis]);
+    let origin = std::array::from_fn(|axis| rays.eye[axis] + jitter * step[axis]);
+    let (mut first, mut last) = (view.first_sample(), view.last_sample);
     for axis in 0..3 {
-        let (eye, step): (f32, f32) = (view.eye[axis], step[axis]);
+        let (origin, step): (f32, f32) = (origin[axis], step[axis]);
+        let (low, high) = (view.low[axis], view.high[axis]);
         if step.abs() < SMALLEST_STEP {
-            if !(view.low[axis]..=view.high[axis]).contains(&eye) {
+            if !(low..=high).contains(&origin) {
                 last = -1.0;
             }
             continue;
         }
         let reciprocal = 1.0 / step;
-        let (a, b) = (
-            (view.low[axis] - eye) * reciprocal,
-            (view.high[axis] - eye) * reciprocal,
-        );
+        let (a, b) = ((low - origin) * reciprocal, (high - origin) * reciprocal);
         first = first.max(a.min(b));
         last = last.min(a.max(b));
     }
-    (step, first.ceil(), last.floor())
+    RayLattice {
+        origin,
+        step,
+        first: first.ceil(),
+        last: last.floor(),
+        number: 0.0,
+    }
 }
 
 /// The values along rays.
 pub(crate) struct Samples<'a> {
     volume: &'a Volume,
+    pub(crate) lattice: &'a RayLattice,
     pub(crate) view: &'a View,
     pub(crate) table: &'a TransferTable<'a>,
     interpolation: Interpolation,
@@ -87,9 +99,9 @@ pub(crate) struct Samples<'a> {
 
 impl Samples<'_> {
     /// Where a sample lies, in voxels.
-    pub(crate) fn place(&self, k: f32, step: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn place(&self, k: f32) -> [f32; 3] {
         std::array::from_fn(|axis| {
-            let place = k * step[axis] + self.view.eye[axis];
+            let place = k * self.lattice.step[axis] + self.lattice.origin[axis];
             place.max(0.0).min(self.view.last_voxel[axis])
         })
     }

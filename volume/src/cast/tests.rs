@@ -3,6 +3,7 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use raywright_bvh::{Aabb, Isa};
+use raywright_imaging::Camera;
 
 use super::*;
 use crate::{

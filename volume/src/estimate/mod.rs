@@ -14,14 +14,14 @@ mod tausworthe;
 
 use rayon::prelude::*;
 
-use raywright_imaging::Camera;
+use raywright_imaging::AnyCamera;
 
 use crate::{
     blocks::Blocks,
     cast::{
-        CastError, CastOptions,
+        CastError, CastOptions, Jitter,
         reference::lattice,
-        view::{SMALLEST_STEP, View},
+        view::{RayLattice, SMALLEST_STEP, View},
     },
     grid::Volume,
     table::{BakedFunction, DEFAULT_SIZE, TableIndex},
@@ -60,7 +60,7 @@ impl EstimateMethod {
 /// What a ray of the estimate found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EstimatedRay {
-    /// Number of the sample at which it enters the first block in which something can be seen.
+    /// Number of the sample, counted as in [`Picture`](crate::Picture), at which it enters the first block in which something can be seen.
     pub front: f32,
     /// Number of the sample at which it leaves the last one.
     pub back: f32,
@@ -184,16 +184,17 @@ impl PreparedEstimate<'_> {
     /// As [`Prepared::render`](crate::Prepared::render).
     pub fn estimate(
         &self,
-        camera: &Camera,
+        camera: impl Into<AnyCamera>,
         [width, height]: [u32; 2],
         options: &CastOptions,
         frame: u32,
     ) -> Result<Estimate, CastError> {
         options.check()?;
-        let projection = camera.projection(width, height)?;
-        let step = options.step * self.volume.unit_length();
+        let rays = camera.into().picture_frame(width, height)?;
+        // The ray in the middle stands for all of its square.
+        let (clip, jitter) = (options.clip.as_ref(), Jitter::None);
         let march = March {
-            view: View::new(self.volume, &projection, step, options.clip.as_ref()),
+            view: View::new(self.volume, &rays, options.step, clip, jitter)?,
             prepared: self,
             step: options.step,
             termination: options.termination,
@@ -229,14 +230,14 @@ struct Piece {
 impl March<'_> {
     /// The ray through a point of the picture, and the steps that it took.
     fn ray(&self, x: f32, y: f32, [frame, tile]: [u32; 2]) -> (EstimatedRay, u64) {
-        let (step, first, last) = lattice(&self.view, x, y);
+        let samples = lattice(&self.view, x, y, 0.0);
         let mut steps = 0;
         let (mut front, mut back) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut depth, mut end) = (0.0, f32::INFINITY);
         let (mut lit, mut seen) = (0.0, 0.0);
         // What a ray has to pass to be as opaque as the threshold.
         let most_depth = -(-self.termination.min(1.0)).ln_1p();
-        self.pieces(step, first, last, |piece| {
+        self.pieces(&samples, |piece| {
             steps += 1;
             if !self.prepared.lit[piece.block] {
                 return;
@@ -267,7 +268,7 @@ impl March<'_> {
             let mut k = front;
             while k < back {
                 let next = (k + stride).min(back);
-                let block = self.block_at(step, (k + next) * 0.5);
+                let block = self.block_at(&samples, (k + next) * 0.5);
                 let drawn = opacities.draw(block, numbers.unit());
                 steps += 1;
                 opacity += (1.0 - opacity) * (1.0 - (1.0 - drawn).powf((next - k) * self.step));
@@ -283,9 +284,9 @@ impl March<'_> {
             }
         }
         let ray = EstimatedRay {
-            front,
-            back,
-            end: end.min(back),
+            front: front + samples.number,
+            back: back + samples.number,
+            end: end.min(back) + samples.number,
             lit,
             seen,
         };
@@ -293,8 +294,8 @@ impl March<'_> {
     }
 
     /// The block along one axis at a sample.
-    fn block_along(&self, axis: usize, step: f32, k: f32) -> usize {
-        let place = (k * step + self.view.eye[axis]).max(0.0);
+    fn block_along(&self, axis: usize, samples: &RayLattice, k: f32) -> usize {
+        let place = (k * samples.step[axis] + samples.origin[axis]).max(0.0);
         (place as usize >> BLOCK_SHIFT).min(self.prepared.dims[axis] - 1)
     }
 
@@ -303,20 +304,27 @@ impl March<'_> {
         (z * down + y) * across + x
     }
 
-    fn block_at(&self, step: [f32; 3], k: f32) -> usize {
+    fn block_at(&self, samples: &RayLattice, k: f32) -> usize {
         self.index(std::array::from_fn(|axis| {
-            self.block_along(axis, step[axis], k)
+            self.block_along(axis, samples, k)
         }))
     }
 
     /// Tells the parts of a ray in the blocks that it passes, in order: Amanatides, Woo, *A Fast Voxel
     /// Traversal Algorithm for Ray Tracing*, 1987, each border computed anew.
-    fn pieces(&self, step: [f32; 3], first: f32, last: f32, mut tell: impl FnMut(Piece)) {
+    fn pieces(&self, samples: &RayLattice, mut tell: impl FnMut(Piece)) {
+        let RayLattice {
+            origin,
+            step,
+            first,
+            last,
+            ..
+        } = *samples;
         if first > last {
             return;
         }
         let per_step = step.map(|step| 1.0 / step);
-        let mut block = [0, 1, 2].map(|axis| self.block_along(axis, step[axis], first));
+        let mut block = [0, 1, 2].map(|axis| self.block_along(axis, samples, first));
         // The number of the sample at which the ray leaves its block along an axis.
         let exit = |axis: usize, block: usize| {
             let inner = if step[axis] < 0.0 { block } else { block + 1 };
@@ -324,7 +332,7 @@ impl March<'_> {
             if is_last || step[axis].abs() < SMALLEST_STEP {
                 f32::INFINITY
             } else {
-                ((inner << BLOCK_SHIFT) as f32 - self.view.eye[axis]) * per_step[axis]
+                ((inner << BLOCK_SHIFT) as f32 - origin[axis]) * per_step[axis]
             }
         };
         let mut exits = [0, 1, 2].map(|axis| exit(axis, block[axis]));
@@ -361,6 +369,7 @@ impl March<'_> {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use raywright_imaging::Camera;
 
     use super::*;
     use crate::{
