@@ -70,13 +70,13 @@ fn record(
             options.step = step as f32;
             let size = [side; 2];
             let prepared = estimator.prepare(&moment.function, EstimateMethod::MeanExtinction);
-            let estimate = prepared.estimate(&moment.camera, size, &options, index as u32)?;
+            let estimate = prepared.estimate(moment.camera, size, &options, index as u32)?;
             let prepared = caster.prepare(&moment.function);
             let mut wall = f64::INFINITY;
             let mut work = Work::default();
             for _ in 0..2 {
                 let start = Instant::now();
-                work = prepared.render(&moment.camera, size, &options)?.work;
+                work = prepared.render(moment.camera, size, &options)?.work;
                 wall = wall.min(start.elapsed().as_secs_f64());
             }
             let switched = moment.function_key != last_key;

@@ -61,7 +61,7 @@ fn as_many_samples_as_another_caster_takes() {
             let picture = caster
                 .render(
                     &view.transfer_functions[&row[1]],
-                    &view.cameras[&row[2]],
+                    view.cameras[&row[2]],
                     SIZE,
                     &options,
                 )

@@ -58,13 +58,13 @@ fn lead(
         let mut options = CastOptions::default();
         let estimate = estimator
             .prepare(&moment.function, EstimateMethod::MeanExtinction)
-            .estimate(&moment.camera, SIZE, &options, frame as u32)
+            .estimate(moment.camera, SIZE, &options, frame as u32)
             .expect("an estimate");
         let outlook = Outlook::new(&estimate, volume, &moment.camera, SIZE, options.step);
         let mut pass = steering.begin(&predictor.frame(&outlook));
         loop {
             options.step = pass.quality.step as f32;
-            let picture = caster.render(&moment.function, &moment.camera, SIZE, &options);
+            let picture = caster.render(&moment.function, moment.camera, SIZE, &options);
             let work = picture.expect("a picture").work;
             let time = clock.time(&work, frame);
             let lesson = predictor.learn(&outlook, pass.quality, &work, time);

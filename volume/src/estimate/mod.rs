@@ -408,12 +408,12 @@ mod tests {
                     ..CastOptions::default()
                 };
                 let size = [96, 96];
-                let picture = caster.render(&function, &camera, size, &options).unwrap();
+                let picture = caster.render(&function, camera, size, &options).unwrap();
                 let samples = picture.work.samples as f64;
                 for method in EstimateMethod::ALL {
                     let estimate = estimator
                         .prepare(&function, method)
-                        .estimate(&camera, size, &options, 0)
+                        .estimate(camera, size, &options, 0)
                         .unwrap();
                     let ratio = estimate.samples() / samples;
                     // Draws end in coarse steps; silhouettes are known by squares of pixels.
@@ -438,7 +438,7 @@ mod tests {
             let options = CastOptions::default();
             let estimate = estimator
                 .prepare(&function, method)
-                .estimate(&camera, [33, 17], &options, 5)
+                .estimate(camera, [33, 17], &options, 5)
                 .unwrap();
             assert_eq!(estimate.tiles, [5, 3]);
             assert!(

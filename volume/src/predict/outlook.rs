@@ -200,7 +200,7 @@ mod tests {
             let size = [600, 400];
             let estimate = estimator
                 .prepare(&function, EstimateMethod::MeanExtinction)
-                .estimate(&camera, size, &options, 0)
+                .estimate(camera, size, &options, 0)
                 .unwrap();
             let outlook = Outlook::new(&estimate, &volume, &camera, size, step);
             // 64 of 111 units of height are seen; a ray is 32 voxels long.

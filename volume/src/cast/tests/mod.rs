@@ -1,0 +1,306 @@
+//! Kernels against the slow twin.
+
+mod details;
+mod geometry;
+
+use glam::Vec3;
+use proptest::prelude::*;
+use raywright_bvh::{Aabb, Isa};
+use raywright_imaging::{AnyCamera, Camera};
+
+use super::*;
+use crate::{
+    grid::{ValueScale, Voxels},
+    transfer::ControlPoint,
+};
+
+fn function(points: &[[f32; 5]]) -> TransferFunction {
+    let points: Vec<ControlPoint> = points.iter().map(|&p| p.into()).collect();
+    TransferFunction::new(points).unwrap()
+}
+
+/// A blob in the middle of little, and specks.
+fn values(dims: [usize; 3], seed: u32) -> Vec<f32> {
+    let mut values = Vec::new();
+    let mut state = seed | 1;
+    for z in 0..dims[2] {
+        for y in 0..dims[1] {
+            for x in 0..dims[0] {
+                let at = |i: usize, axis: usize| (i as f32 + 0.5) / dims[axis] as f32 - 0.5;
+                let r = Vec3::new(at(x, 0), at(y, 1), at(z, 2)).length();
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (state >> 24) as f32 / 40.0;
+                let speck = if state >> 16 & 0xfff == 7 { 200.0 } else { 0.0 };
+                values.push(
+                    (255.0 * (1.0 - 3.0 * r) + noise + speck)
+                        .clamp(0.0, 255.0)
+                        .round(),
+                );
+            }
+        }
+    }
+    values
+}
+
+fn volumes(dims: [usize; 3], spacing: [f32; 3], seed: u32) -> Vec<Volume> {
+    let values = values(dims, seed);
+    let new = |voxels, slope| {
+        let scale = ValueScale {
+            slope,
+            intercept: 3.0,
+        };
+        Volume::new(dims, spacing, voxels, scale).unwrap()
+    };
+    let mut missing = values.clone();
+    for (i, value) in missing.iter_mut().enumerate() {
+        if i % 97 == 5 {
+            *value = f32::NAN;
+        }
+    }
+    vec![
+        new(Voxels::U8(values.iter().map(|&v| v as u8).collect()), 1.0),
+        new(
+            Voxels::U16(values.iter().map(|&v| v as u16 * 257).collect()),
+            -0.01,
+        ),
+        new(Voxels::F32(values), 0.5),
+        new(Voxels::F32(missing), 0.5),
+    ]
+}
+
+fn functions(volume: &Volume) -> [TransferFunction; 3] {
+    let [low, high] = volume.range();
+    let at = |share: f32| low + (high - low) * share;
+    [
+        function(&[
+            [at(0.0), 0.2, 0.3, 0.4, 0.0],
+            [at(0.5), 0.9, 0.3, 0.4, 0.0],
+            [at(1.0), 1.0, 1.0, 0.9, 0.9],
+        ]),
+        function(&[
+            [at(0.1), 0.2, 0.3, 0.4, 0.01],
+            [at(0.9), 1.0, 0.1, 0.2, 0.2],
+        ]),
+        // A narrow band.
+        function(&[
+            [at(0.41), 0.0, 0.0, 0.0, 0.0],
+            [at(0.41), 1.0, 0.8, 0.1, 1.0],
+            [at(0.42), 1.0, 0.8, 0.1, 1.0],
+            [at(0.42), 0.0, 0.0, 0.0, 0.0],
+        ]),
+    ]
+}
+
+fn check(volume: &Volume, camera: impl Into<AnyCamera>, size: [u32; 2], step: f32) {
+    let camera = camera.into();
+    for function in functions(volume) {
+        check_appearance(volume, function.into(), camera, size, step);
+    }
+}
+
+/// Compares every kernel with the slow twin and returns the picture.
+fn check_appearance(
+    volume: &Volume,
+    appearance: Appearance,
+    camera: impl Into<AnyCamera>,
+    size: [u32; 2],
+    step: f32,
+) -> Picture {
+    let camera = camera.into();
+    let caster = Raycaster::new(volume).unwrap();
+    let options = CastOptions {
+        step,
+        ..CastOptions::default()
+    };
+    let prepared = caster.prepare_appearance(appearance.clone()).unwrap();
+    let expected = prepared.render_slowly(camera, size, &options).unwrap();
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        for skipping in [Skipping::None, Skipping::Distance] {
+            let options = CastOptions {
+                isa,
+                skipping,
+                ..options
+            };
+            let picture = prepared.render(camera, size, &options).unwrap();
+            for i in 0..picture.opacity.len() {
+                let of = |p: &Picture| (p.image.pixels()[i], p.opacity[i], p.end[i]);
+                assert_eq!(
+                    of(&picture),
+                    of(&expected),
+                    "pixel {i}, {isa}, {skipping:?}, {appearance:?}"
+                );
+            }
+        }
+    }
+    expected
+}
+
+#[test]
+fn every_kernel_gives_the_bits_of_the_slow_twin() {
+    let mut lit = 0;
+    for (dims, spacing) in [
+        ([20, 17, 31], [1.0, 1.5, 0.7]),
+        ([1, 9, 8], [1.0; 3]),
+        ([9, 1, 12], [1.0; 3]),
+        ([3, 40, 1], [0.5, 1.0, 2.0]),
+        ([1, 1, 1], [1.0; 3]),
+    ] {
+        for volume in volumes(dims, spacing, 3) {
+            let extent = volume.extent();
+            let outside = extent * 0.5 + Vec3::new(1.3, -1.9, 1.1) * (extent.length() + 1.0) * 0.6;
+            for origin in [outside, extent * 0.45 + 0.01] {
+                let camera = Camera::new(origin, extent * 0.51, Vec3::Z, 45.0).unwrap();
+                check(&volume, camera, [45, 38], 0.8);
+                lit += 1;
+            }
+        }
+    }
+    assert_eq!(lit, 40);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn any_view_of_any_volume(
+        dims in prop::array::uniform3(1usize..24),
+        spacing in prop::array::uniform3(0.2f32..3.0),
+        origin in prop::array::uniform3(-1.5f32..2.5),
+        target in prop::array::uniform3(0.0f32..1.0),
+        fov in 5.0f32..120.0,
+        step in 0.2f32..3.0,
+        seed in 0u32..1000,
+        which in 0usize..4,
+    ) {
+        let volume = &volumes(dims, spacing, seed)[which];
+        let extent = volume.extent().max(Vec3::splat(0.5));
+        let camera = Camera::new(Vec3::from(origin) * extent, Vec3::from(target) * extent, Vec3::new(0.1, 0.2, 1.0), fov);
+        if let Ok(camera) = camera {
+            check(volume, camera, [23, 19], step);
+        }
+    }
+}
+
+#[test]
+fn a_constant_medium_is_as_opaque_as_its_length_says() {
+    let volume = Volume::new(
+        [33, 33, 33],
+        [1.0; 3],
+        Voxels::U8(vec![7; 33 * 33 * 33]),
+        ValueScale::default(),
+    )
+    .unwrap();
+    let caster = Raycaster::new(&volume).unwrap();
+    let function = function(&[[0.0, 0.5, 0.25, 1.0, 0.05]]);
+    let camera = Camera::new(
+        Vec3::new(16.0, 16.0, -40.0),
+        Vec3::splat(16.0),
+        Vec3::Y,
+        10.0,
+    )
+    .unwrap();
+    for step in [2.0, 1.0, 0.5, 0.25] {
+        let options = CastOptions {
+            step,
+            termination: 1.0,
+            ..CastOptions::default()
+        };
+        let picture = caster.render(&function, camera, [1, 1], &options).unwrap();
+        // Samples at 40, 40 + step, … 72: one more than there are steps.
+        let expected = 1.0 - 0.95_f64.powf(f64::from(32.0 + step));
+        assert!(
+            (f64::from(picture.opacity[0]) - expected).abs() < 1e-5,
+            "{step}: {}",
+            picture.opacity[0]
+        );
+        let [r, g, b] = picture.image.pixels()[0].map(f64::from);
+        assert!(
+            (r - 0.5 * expected).abs() < 1e-5
+                && (g - 0.25 * expected).abs() < 1e-5
+                && (b - expected).abs() < 1e-5
+        );
+    }
+}
+
+#[test]
+fn what_is_hidden_is_taken_to_be_the_same() {
+    let volume = &volumes([20, 20, 20], [1.0; 3], 5)[0];
+    let caster = Raycaster::new(volume).unwrap();
+    let function = function(&[[0.0, 0.8, 0.4, 0.2, 0.3]]);
+    let camera = Camera::new(Vec3::splat(-30.0), Vec3::splat(9.5), Vec3::Z, 40.0).unwrap();
+    let render = |termination, behind| {
+        let options = CastOptions {
+            termination,
+            behind,
+            ..CastOptions::default()
+        };
+        caster
+            .render(&function, camera, [16, 16], &options)
+            .unwrap()
+    };
+    let exact = render(1.0, Behind::Nothing);
+    let errors = |behind| {
+        let picture = render(0.9, behind);
+        let pixels = picture.image.pixels().iter().zip(exact.image.pixels());
+        let errors: Vec<f32> = pixels.map(|(a, b)| (a[0] - b[0]).abs()).collect();
+        let mean = errors.iter().sum::<f32>() / errors.len() as f32;
+        (errors.into_iter().fold(0.0, f32::max), mean)
+    };
+    let [(most, mean), (most_dark, mean_dark)] = [Behind::TheSame, Behind::Nothing].map(errors);
+    // Never more than what a ray of the threshold's opacity lacks, in red.
+    assert!(most.max(most_dark) <= 0.08 + 1e-6, "{most} {most_dark}");
+    assert!(mean < 0.3 * mean_dark, "{mean} {mean_dark}");
+}
+
+#[test]
+fn a_clip_box_takes_samples_away_and_moves_none() {
+    let volume = &volumes([20, 17, 31], [1.0, 1.5, 0.7], 3)[1];
+    let extent = volume.extent();
+    let camera = Camera::new(
+        extent * 0.5 + Vec3::new(50.0, -30.0, 20.0),
+        extent * 0.5,
+        Vec3::Z,
+        40.0,
+    )
+    .unwrap();
+    let caster = Raycaster::new(volume).unwrap();
+    let prepared = caster.prepare(&functions(volume)[1]);
+    let render = |clip: Option<(Vec3, Vec3)>, isa| {
+        let clip = clip.map(|(min, max)| Aabb { min, max });
+        let options = CastOptions {
+            clip,
+            isa,
+            ..CastOptions::default()
+        };
+        let picture = prepared.render(camera, [40, 40], &options).unwrap();
+        let slow = prepared.render_slowly(camera, [40, 40], &options).unwrap();
+        assert_eq!((&picture.image, &picture.end), (&slow.image, &slow.end));
+        picture
+    };
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let whole = render(None, isa);
+        let around = render(Some((Vec3::splat(-9.0), extent + 9.0)), isa);
+        assert_eq!(around, whole);
+        let half = render(Some((Vec3::ZERO, extent * Vec3::new(1.0, 0.5, 1.0))), isa);
+        assert!(half.work.samples < whole.work.samples * 2 / 3);
+        // What a ray meets first is seen the same if it is inside.
+        let same = half.image.pixels().iter().zip(whole.image.pixels());
+        assert!(same.filter(|(a, b)| a == b && a[0] > 0.0).count() > 20);
+        let nothing = render(Some((extent, Vec3::ZERO)), isa);
+        assert_eq!(
+            (nothing.work, nothing.opacity.iter().sum::<f32>()),
+            (Work::default(), 0.0)
+        );
+    }
+    let clip = Some(Aabb {
+        min: Vec3::NAN,
+        max: extent,
+    });
+    let options = CastOptions {
+        clip,
+        ..CastOptions::default()
+    };
+    let error = caster
+        .render(&functions(volume)[1], camera, [4, 4], &options)
+        .unwrap_err();
+    assert!(matches!(error, CastError::Clip { .. }));
+}
