@@ -13,6 +13,7 @@
 //! | [`statistics`] | mean and percentiles |
 //! | [`appearance`] | shading, surfaces, pre-integration |
 //! | [`cast`] | a picture of a volume |
+//! | [`enclosure`] | where a ray can see something, by trees |
 //! | [`estimate`] | how long rays will be, before they are cast |
 //! | [`predict`] | what a frame will take, before it is drawn |
 //! | [`steer`] | in which quality a frame takes a given time |
@@ -23,6 +24,7 @@ pub mod appearance;
 mod blocks;
 pub mod cast;
 mod distance;
+pub mod enclosure;
 pub mod estimate;
 pub mod generate;
 pub mod grid;
@@ -42,7 +44,11 @@ pub use crate::{
     appearance::{
         Appearance, AppearanceError, Integration, Interpolation, IsoSurface, Light, Shading,
     },
-    cast::{Behind, CastError, CastOptions, Jitter, Picture, Prepared, Raycaster, Skipping, Work},
+    cast::{
+        Behind, CastError, CastOptions, Counts, Jitter, Picture, Prepared, RayWork, Raycaster,
+        Skipping, Work,
+    },
+    enclosure::{EnclosureError, EnclosureKind, EnclosureParams},
     estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},

@@ -5,15 +5,16 @@
 //! matter together a ray that leaves empty space takes the last sample in it first, so that the next
 //! has one before it. Between two samples in one cube of empty blocks nothing is seen: the values on
 //! the way are those of blocks whose ranges overlap, and none of the ranges shows anything. That
-//! holds only where no value is missing; volumes with missing values are not skipped through.
+//! holds only where no value is missing; volumes with missing values are not skipped through then.
 
 use raywright_bvh::simd::{GatherLanes, splat_all};
 
 use super::{
+    Work,
     details::{Details, RawSurface, SMALLEST_SQUARE, SURFACE_TURNS, Shade},
     field::{Field, Voxel},
-    kernel::{IDLE_EIGHTHS, Light, Look, TileKernel},
-    lanes::{LaneStates, Waiting},
+    kernel::{Counted, Light, Look, TileKernel},
+    lanes::{LaneStates, Queue},
     space::Space,
 };
 use crate::{appearance::Interpolation, slabs::SLAB_SIZE, table::FULL_COLOUR};
@@ -149,29 +150,24 @@ fn power<const N: usize, L: GatherLanes<N>>(mut x: L, mut n: u32) -> L {
 
 impl<V: Voxel> TileKernel<'_, V> {
     #[inline(always)]
-    pub(crate) fn cast_detailed<const N: usize, L: GatherLanes<N>>(
+    pub(crate) fn cast_detailed<const N: usize, L: GatherLanes<N>, const COUNT: bool>(
         self,
-        waiting: &[Waiting],
+        mut queue: Queue,
         details: &Details,
     ) {
         let frame = self.frame;
         let shape = Field::<N, L, V>::new(frame.volume, &frame.view, self.voxels);
         let needs_front = details.needs_front();
-        let is_whole = !(needs_front && frame.volume.missing() > 0);
-        let map = frame.distances.filter(|_| is_whole);
-        let space = map.map(|map| Space::<N, L>::new(map, frame.view.border));
+        let space = frame
+            .distances
+            .map(|map| Space::<N, L>::new(map, frame.view.border));
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let look = Look::<N, L>::new(frame.table, V::IS_WHOLE);
         let threshold = L::splat(frame.termination);
 
         let mut lanes = LaneStates::<N>::idle();
-        let mut next = 0;
-        let (mut samples, mut lit_samples, mut skips) = (0_u64, 0_u64, 0_u64);
-        loop {
-            lanes.refill(waiting, &mut next, self.results);
-            if lanes.are_idle() {
-                break;
-            }
+        let mut work = Work::default();
+        while let Some(enough) = lanes.refill(&mut queue, frame.termination, self.results) {
             let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),
@@ -195,10 +191,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                 opacity: L::load(&lanes.opacity),
             };
             let exits = space.map(|space| space.exits(&step));
-            let enough = match waiting.len() - next {
-                0 => 1,
-                _ => N as u32 - N as u32 * IDLE_EIGHTHS / 8,
-            };
+            let mut counts = Counted::<N, L>::of(&lanes);
             let mut unchecked = 0;
             loop {
                 let active = k.le(last);
@@ -206,6 +199,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                 if count < enough {
                     break;
                 }
+                work.packet_steps += 1;
                 let place = field.place(k, &step);
                 // How many samples further the next one is that matters.
                 let mut ahead = one;
@@ -217,11 +211,18 @@ impl<V: Voxel> TileKernel<'_, V> {
                     // With a sample before it that is the last one inside, else the first outside.
                     let far = if needs_front { inside } else { inside.add(one) };
                     ahead = L::select(zero.lt(distance) & one.lt(far), far, one);
-                    skips += u64::from(L::bits(one.lt(ahead) & active).count_ones());
+                    let skipped = one.lt(ahead) & active;
+                    work.skips += u64::from(L::bits(skipped).count_ones());
+                    if COUNT {
+                        counts.skip(skipped);
+                    }
                     unchecked = SAMPLES_PER_CHECK;
                 }
                 unchecked = unchecked.saturating_sub(1);
-                samples += u64::from(count);
+                work.samples += u64::from(count);
+                if COUNT {
+                    counts.sample(active);
+                }
                 let back = view.value(&place);
                 let before = light.opacity;
                 for surface in &details.surfaces {
@@ -256,7 +257,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                     let colour = L::gather_triples(colours, item);
                     light.add(alpha, view.shaded(colour, &place));
                 }
-                lit_samples += u64::from(L::bits(before.lt(light.opacity)).count_ones());
+                work.lit_samples += u64::from(L::bits(before.lt(light.opacity)).count_ones());
                 // A ray that is done ends before its next sample.
                 last = L::select(threshold.lt(light.opacity) & active, k, last);
                 front = L::select(one.lt(ahead), L::splat(f32::NAN), back);
@@ -268,10 +269,10 @@ impl<V: Voxel> TileKernel<'_, V> {
             let [r, g, b] = light.colour;
             lanes.colour = [r.store(), g.store(), b.store()];
             lanes.opacity = light.opacity.store();
+            if COUNT {
+                counts.store(&mut lanes);
+            }
         }
-        self.work.rays += waiting.len() as u64;
-        self.work.samples += samples;
-        self.work.lit_samples += lit_samples;
-        self.work.skips += skips;
+        self.work.add(&work);
     }
 }

@@ -11,9 +11,9 @@
 use raywright_bvh::simd::{GatherLanes, LaneKernel};
 
 use super::{
-    Frame, RayResult, Work,
+    Counts, Frame, RayResult, Work,
     field::{Field, Voxel},
-    lanes::{LaneStates, Waiting},
+    lanes::{LaneStates, Queue, Waiting},
     space::Space,
     view::{NearRays, RayLattice, Rays, SMALLEST_STEP},
 };
@@ -22,9 +22,6 @@ use crate::table::TransferTable;
 /// So many pairs of samples are taken before the distance map is asked again: a few samples too
 /// many, and less time than asking before each pair, by 8 % and more.
 const PAIRS_PER_CHECK: u32 = 4;
-
-/// New rays are taken when so many of eight lanes are idle.
-pub(crate) const IDLE_EIGHTHS: u32 = 3;
 
 /// Casts the rays of a rectangle of pixels.
 pub(crate) struct TileKernel<'a, V> {
@@ -41,13 +38,17 @@ impl<V: Voxel> LaneKernel for TileKernel<'_, V> {
     type Output = ();
 
     #[inline(always)]
-    fn run<const N: usize, L: GatherLanes<N>>(self) {
-        let mut waiting = Vec::with_capacity(self.results.len());
-        self.set_up::<N, L>(&mut waiting);
-        match (self.frame.details, self.frame.distances) {
-            (Some(details), _) => self.cast_detailed::<N, L>(&waiting, details),
-            (None, Some(_)) => self.cast::<N, L, true>(&waiting),
-            (None, None) => self.cast::<N, L, false>(&waiting),
+    fn run<const N: usize, L: GatherLanes<N>>(mut self) {
+        let mut queue = Queue::default();
+        self.set_up::<N, L>(&mut queue);
+        let is_counted = self.frame.counts == Counts::PerRay;
+        match (self.frame.details, self.frame.distances, is_counted) {
+            (Some(details), _, false) => self.cast_detailed::<N, L, false>(queue, details),
+            (Some(details), _, true) => self.cast_detailed::<N, L, true>(queue, details),
+            (None, Some(_), false) => self.cast::<N, L, true, false>(queue),
+            (None, Some(_), true) => self.cast::<N, L, true, true>(queue),
+            (None, None, false) => self.cast::<N, L, false, false>(queue),
+            (None, None, true) => self.cast::<N, L, false, true>(queue),
         }
     }
 }
@@ -55,12 +56,15 @@ impl<V: Voxel> LaneKernel for TileKernel<'_, V> {
 impl<V: Voxel> TileKernel<'_, V> {
     /// The rays that have samples, in small squares of pixels.
     #[inline(always)]
-    fn set_up<const N: usize, L: GatherLanes<N>>(&self, waiting: &mut Vec<Waiting>) {
+    fn set_up<const N: usize, L: GatherLanes<N>>(&mut self, queue: &mut Queue) {
         const SIDE: u32 = 4;
-        let view = &self.frame.view;
+        let frame = self.frame;
+        let view = &frame.view;
         let (width, height) = (self.columns.len() as u32, self.rows.len() as u32);
         let lanes_down = N as u32 / SIDE;
         let mut rays = [RayLattice::NONE; N];
+        let mut hits = Vec::new();
+        queue.rays.reserve(self.results.len());
         for y in (0..height).step_by(lanes_down as usize) {
             for x in (0..width).step_by(SIDE as usize) {
                 let (mut xs, mut ys, mut jitter) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -81,15 +85,31 @@ impl<V: Voxel> TileKernel<'_, V> {
                 }
                 for (lane, samples) in rays.iter().enumerate() {
                     let (x, y) = (x + lane as u32 % SIDE, y + lane as u32 / SIDE);
-                    if x < width && y < height && samples.first <= samples.last {
-                        waiting.push(Waiting {
-                            samples: *samples,
-                            pixel: y * width + x,
-                        });
+                    if x >= width || y >= height || samples.first > samples.last {
+                        continue;
                     }
+                    self.work.rays += 1;
+                    let pixel = y * width + x;
+                    let start = queue.intervals.len() as u32;
+                    if let Some(enclosure) = frame.enclosure {
+                        let beside = frame.needs_front();
+                        enclosure.intervals(samples, beside, &mut hits, |first, last| {
+                            queue.intervals.push([first, last]);
+                        });
+                        if queue.intervals.len() as u32 == start {
+                            self.results[pixel as usize].end = samples.last + 1.0 + samples.number;
+                            continue;
+                        }
+                    }
+                    queue.rays.push(Waiting {
+                        samples: *samples,
+                        pixel,
+                        intervals: [start, queue.intervals.len() as u32],
+                    });
                 }
             }
         }
+        self.work.skips += queue.intervals.len() as u64;
     }
 
     /// The rays through points of the picture, moved by a share of a step.
@@ -149,7 +169,10 @@ impl<V: Voxel> TileKernel<'_, V> {
     }
 
     #[inline(always)]
-    fn cast<const N: usize, L: GatherLanes<N>, const SKIP: bool>(self, waiting: &[Waiting]) {
+    fn cast<const N: usize, L: GatherLanes<N>, const SKIP: bool, const COUNT: bool>(
+        self,
+        mut queue: Queue,
+    ) {
         let Frame {
             volume,
             view,
@@ -165,14 +188,8 @@ impl<V: Voxel> TileKernel<'_, V> {
         let threshold = L::splat(*termination);
 
         let mut lanes = LaneStates::<N>::idle();
-        let mut next = 0;
-        let (mut samples, mut lit_samples, mut skips) = (0_u64, 0_u64, 0_u64);
-        let refill = N as u32 - N as u32 * IDLE_EIGHTHS / 8;
-        loop {
-            lanes.refill(waiting, &mut next, self.results);
-            if lanes.are_idle() {
-                break;
-            }
+        let mut work = Work::default();
+        while let Some(enough) = lanes.refill(&mut queue, *termination, self.results) {
             let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),
@@ -190,7 +207,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                 opacity: L::load(&lanes.opacity),
             };
             let exits = space.map(|space| space.exits(&step));
-            let enough = if next < waiting.len() { refill } else { 1 };
+            let mut counts = Counted::<N, L>::of(&lanes);
             let mut unchecked = 0;
             loop {
                 let active = k.le(last);
@@ -198,6 +215,7 @@ impl<V: Voxel> TileKernel<'_, V> {
                 if count < enough {
                     break;
                 }
+                work.packet_steps += 1;
                 let place = field.place(k, &step);
                 if SKIP
                     && unchecked == 0
@@ -208,7 +226,10 @@ impl<V: Voxel> TileKernel<'_, V> {
                     if L::bits(is_empty) != 0 {
                         let inside = space.samples_inside(&exits, &block, distance, &place);
                         k = L::select(is_empty, k.add(inside).add(one), k);
-                        skips += u64::from(L::bits(is_empty).count_ones());
+                        work.skips += u64::from(L::bits(is_empty).count_ones());
+                        if COUNT {
+                            counts.skip(is_empty);
+                        }
                         continue;
                     }
                     unchecked = PAIRS_PER_CHECK;
@@ -217,7 +238,11 @@ impl<V: Voxel> TileKernel<'_, V> {
                 // Two samples at a time: while one waits for its fetches, the other is computed.
                 let second = k.add(one);
                 let has_second = second.le(last);
-                samples += u64::from(count + L::bits(has_second).count_ones());
+                work.samples += u64::from(count + L::bits(has_second).count_ones());
+                if COUNT {
+                    counts.sample(active);
+                    counts.sample(has_second);
+                }
                 let value = field.value(&place);
                 let second_value = field.value(&field.place(second, &step));
                 let (entry, alpha) = look.opacity(value, active);
@@ -225,12 +250,12 @@ impl<V: Voxel> TileKernel<'_, V> {
                 if L::bits(zero.lt(alpha.max(second_alpha))) != 0 {
                     let colour = L::gather_triples(table.colours, entry);
                     let second_colour = L::gather_triples(table.colours, second_entry);
-                    lit_samples += u64::from(L::bits(zero.lt(alpha)).count_ones());
+                    work.lit_samples += u64::from(L::bits(zero.lt(alpha)).count_ones());
                     light.add(alpha, colour);
                     // A ray that is done ends before its next sample.
                     last = L::select(threshold.lt(light.opacity) & active, k, last);
                     let second_alpha = L::select(second.le(last), second_alpha, zero);
-                    lit_samples += u64::from(L::bits(zero.lt(second_alpha)).count_ones());
+                    work.lit_samples += u64::from(L::bits(zero.lt(second_alpha)).count_ones());
                     light.add(second_alpha, second_colour);
                     last = L::select(threshold.lt(light.opacity) & second.le(last), second, last);
                 }
@@ -241,11 +266,43 @@ impl<V: Voxel> TileKernel<'_, V> {
             let [r, g, b] = light.colour;
             lanes.colour = [r.store(), g.store(), b.store()];
             lanes.opacity = light.opacity.store();
+            if COUNT {
+                counts.store(&mut lanes);
+            }
         }
-        self.work.rays += waiting.len() as u64;
-        self.work.samples += samples;
-        self.work.lit_samples += lit_samples;
-        self.work.skips += skips;
+        self.work.add(&work);
+    }
+}
+
+/// What rays in lanes took.
+pub(crate) struct Counted<const N: usize, L: GatherLanes<N>> {
+    samples: L,
+    skips: L,
+}
+
+impl<const N: usize, L: GatherLanes<N>> Counted<N, L> {
+    #[inline(always)]
+    pub(crate) fn of(lanes: &LaneStates<N>) -> Self {
+        Self {
+            samples: L::load(&lanes.samples),
+            skips: L::load(&lanes.skips),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn sample(&mut self, mask: L::Mask) {
+        self.samples = L::select(mask, self.samples.add(L::splat(1.0)), self.samples);
+    }
+
+    #[inline(always)]
+    pub(crate) fn skip(&mut self, mask: L::Mask) {
+        self.skips = L::select(mask, self.skips.add(L::splat(1.0)), self.skips);
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(&self, lanes: &mut LaneStates<N>) {
+        lanes.samples = self.samples.store();
+        lanes.skips = self.skips.store();
     }
 }
 

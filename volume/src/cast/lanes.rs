@@ -1,15 +1,32 @@
 //! The rays that wait for lanes and those that are in them, between two loops.
+//!
+//! Invariant: a ray leaves its lane when it is opaque enough or at the end of its last interval, and
+//! takes all its intervals in the same lane.
 
 use raywright_bvh::simd::GatherLanes;
 
-use super::{RayResult, view::RayLattice};
+use super::{RayResult, RayWork, view::RayLattice};
 
 /// A ray that waits for a lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Waiting {
     pub(crate) samples: RayLattice,
     pub(crate) pixel: u32,
+    /// Its intervals in the queue, from one to before another; none: all its samples.
+    pub(crate) intervals: [u32; 2],
 }
+
+/// The rays of a tile.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Queue {
+    pub(crate) rays: Vec<Waiting>,
+    /// Numbers of first and last samples.
+    pub(crate) intervals: Vec<[f32; 2]>,
+    next: usize,
+}
+
+/// New rays are taken when so many of eight lanes are idle.
+const IDLE_EIGHTHS: u32 = 3;
 
 const NO_PIXEL: u32 = u32::MAX;
 
@@ -24,6 +41,12 @@ pub(crate) struct LaneStates<const N: usize> {
     pub(crate) opacity: [f32; N],
     /// The value of the sample before, NaN if there is none.
     pub(crate) front: [f32; N],
+    pub(crate) samples: [f32; N],
+    pub(crate) skips: [f32; N],
+    /// Number of the last sample of the ray.
+    ray_last: [f32; N],
+    /// The intervals that are left.
+    intervals: [[u32; 2]; N],
     pixel: [u32; N],
 }
 
@@ -39,31 +62,53 @@ impl<const N: usize> LaneStates<N> {
             colour: [[0.0; N]; 3],
             opacity: [0.0; N],
             front: [f32::NAN; N],
+            samples: [0.0; N],
+            skips: [0.0; N],
+            ray_last: [-1.0; N],
+            intervals: [[0; 2]; N],
             pixel: [NO_PIXEL; N],
         }
     }
 
-    /// Idle lanes give their results and take rays from `next` on.
+    /// Idle lanes go on with the next interval of their rays, or give their results and take the next
+    /// rays. Returns how many lanes must stay busy until the next time; `None` if all is done.
     #[inline(always)]
     pub(crate) fn refill(
         &mut self,
-        waiting: &[Waiting],
-        next: &mut usize,
+        queue: &mut Queue,
+        termination: f32,
         results: &mut [RayResult],
-    ) {
+    ) -> Option<u32> {
+        let (mut busy, mut is_more) = (0, false);
         for lane in 0..N {
             if self.k[lane] <= self.last[lane] {
+                busy += 1;
+                is_more |= self.intervals[lane][0] < self.intervals[lane][1];
                 continue;
             }
             if self.pixel[lane] != NO_PIXEL {
-                results[self.pixel[lane] as usize] = self.result(lane);
+                let is_opaque = self.opacity[lane] > termination;
+                if !is_opaque && self.take_interval(lane, queue) {
+                    busy += 1;
+                    continue;
+                }
+                results[self.pixel[lane] as usize] = self.result(lane, is_opaque);
                 self.pixel[lane] = NO_PIXEL;
             }
-            if let Some(ray) = waiting.get(*next) {
-                *next += 1;
+            if let Some(ray) = queue.rays.get(queue.next) {
+                queue.next += 1;
                 self.take(lane, ray);
+                self.take_interval(lane, queue);
+                busy += 1;
             }
         }
+        is_more |= queue.next < queue.rays.len();
+        let idle = if is_more {
+            N as u32 * IDLE_EIGHTHS / 8
+        } else {
+            busy
+        };
+        (busy > 0).then(|| busy.saturating_sub(idle).max(1))
     }
 
     /// Where sample 0 of each ray lies, in voxels.
@@ -71,12 +116,6 @@ impl<const N: usize> LaneStates<N> {
     pub(crate) fn origins<L: GatherLanes<N>>(&self) -> [L; 3] {
         let [x, y, z] = &self.origin;
         [L::load(x), L::load(y), L::load(z)]
-    }
-
-    /// Whether no lane has a ray.
-    #[inline(always)]
-    pub(crate) fn are_idle(&self) -> bool {
-        self.pixel.iter().all(|&pixel| pixel == NO_PIXEL)
     }
 
     #[inline(always)]
@@ -92,11 +131,33 @@ impl<const N: usize> LaneStates<N> {
         self.number[lane] = samples.number;
         self.k[lane] = samples.first;
         self.last[lane] = samples.last;
+        self.ray_last[lane] = samples.last;
         self.pixel[lane] = ray.pixel;
+        self.intervals[lane] = ray.intervals;
+        self.samples[lane] = 0.0;
+        self.skips[lane] = (ray.intervals[1] - ray.intervals[0]) as f32;
+    }
+
+    /// Goes on with the next interval of a ray, if there is one.
+    #[inline(always)]
+    fn take_interval(&mut self, lane: usize, queue: &Queue) -> bool {
+        let [next, end] = self.intervals[lane];
+        if next == end {
+            return false;
+        }
+        [self.k[lane], self.last[lane]] = queue.intervals[next as usize];
+        self.intervals[lane][0] += 1;
+        self.front[lane] = f32::NAN;
+        true
     }
 
     #[inline(always)]
-    fn result(&self, lane: usize) -> RayResult {
+    fn result(&self, lane: usize, is_opaque: bool) -> RayResult {
+        let last = if is_opaque {
+            self.last[lane]
+        } else {
+            self.ray_last[lane]
+        };
         RayResult {
             colour: [
                 self.colour[0][lane],
@@ -104,7 +165,11 @@ impl<const N: usize> LaneStates<N> {
                 self.colour[2][lane],
             ],
             opacity: self.opacity[lane],
-            end: self.last[lane] + 1.0 + self.number[lane],
+            end: last + 1.0 + self.number[lane],
+            work: RayWork {
+                samples: self.samples[lane] as u32,
+                skips: self.skips[lane] as u32,
+            },
         }
     }
 }

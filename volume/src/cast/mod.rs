@@ -15,12 +15,14 @@ mod space;
 mod tiles;
 pub(crate) mod view;
 
+use raywright_bvh::{BuildWorkspace, TreeStats};
 use raywright_imaging::{AnyCamera, Image};
 
 use crate::{
     appearance::{Appearance, AppearanceError, Integration, IsoSurface},
     blocks::Blocks,
     distance::DistanceMap,
+    enclosure::{Enclosure, EnclosureError, EnclosureParams, LitBlocks},
     grid::Volume,
     slabs,
     table::{BakedFunction, DEFAULT_SIZE, FULL_COLOUR, TableIndex, TransferTable},
@@ -28,8 +30,8 @@ use crate::{
 };
 use details::{Details, RawSurface};
 use field::Layout;
-pub use options::{Behind, CastError, CastOptions, Jitter, Skipping};
-pub use picture::{Picture, Work};
+pub use options::{Behind, CastError, CastOptions, Counts, Jitter, Skipping};
+pub use picture::{Picture, RayWork, Work};
 use tiles::cast_tiles;
 use view::View;
 
@@ -45,11 +47,18 @@ pub(crate) struct Frame<'a> {
     termination: f32,
     behind: Behind,
     distances: Option<&'a DistanceMap>,
+    enclosure: Option<&'a Enclosure>,
+    counts: Counts,
     /// What else is asked for.
     details: Option<&'a Details>,
 }
 
 impl Frame<'_> {
+    /// Whether two samples that follow each other matter together.
+    fn needs_front(&self) -> bool {
+        self.details.is_some_and(Details::needs_front)
+    }
+
     /// The colour and opacity of a pixel.
     fn finish(&self, result: &RayResult) -> ([f32; 3], f32) {
         if result.opacity > self.termination && self.behind == Behind::TheSame {
@@ -69,6 +78,8 @@ pub(crate) struct RayResult {
     pub(crate) opacity: f32,
     /// Number of the sample behind the last that was looked at; 0 if there was none.
     pub(crate) end: f32,
+    /// What it took, if that is counted.
+    pub(crate) work: RayWork,
 }
 
 impl RayResult {
@@ -77,6 +88,10 @@ impl RayResult {
         colour: [0.0; 3],
         opacity: 0.0,
         end: 0.0,
+        work: RayWork {
+            samples: 0,
+            skips: 0,
+        },
     };
 }
 
@@ -146,6 +161,7 @@ impl<'a> Raycaster<'a> {
             baked,
             surfaces,
             appearance,
+            enclosure: None,
         }
     }
 
@@ -192,9 +208,39 @@ pub struct Prepared<'a> {
     /// By rising value.
     surfaces: Vec<RawSurface>,
     distances: DistanceMap,
+    enclosure: Option<Enclosure>,
 }
 
 impl Prepared<'_> {
+    /// Builds a tree around what can be seen, for [`Skipping::Enclosure`]; the tree that there was goes,
+    /// and gives its memory to the workspace. Returns what the tree is like.
+    ///
+    /// # Errors
+    /// [`EnclosureError`] if a parameter has no meaning, or the build is refused.
+    pub fn enclose(
+        &mut self,
+        params: &EnclosureParams,
+        workspace: &mut BuildWorkspace,
+    ) -> Result<TreeStats, EnclosureError> {
+        if let Some(old) = self.enclosure.take() {
+            old.recycle(workspace);
+        }
+        let map = &self.distances;
+        let count = map.dims.iter().product();
+        let sides = view::sides(self.caster.volume);
+        let blocks = LitBlocks {
+            dims: map.dims,
+            lit: map.distances[..count].iter().map(|&d| d == 0).collect(),
+            shift: map.shift,
+            low: sides.map(|side| side[0]),
+            high: sides.map(|side| side[1]),
+        };
+        let enclosure = Enclosure::new(&blocks, params, workspace)?;
+        let stats = enclosure.stats();
+        self.enclosure = Some(enclosure);
+        Ok(stats)
+    }
+
     /// A picture of `width` × `height` pixels.
     ///
     /// # Errors
@@ -211,7 +257,7 @@ impl Prepared<'_> {
     }
 
     /// The same picture by one ray after the other, which skips nothing and uses no lanes: slow, and
-    /// short enough to be checked by eye. What it took is not counted.
+    /// short enough to be checked by eye. What it took is counted by ray alone.
     ///
     /// # Errors
     /// As [`Prepared::render`].
@@ -230,6 +276,9 @@ impl Prepared<'_> {
                     picture.image.pixels_mut()[pixel] = colour;
                     picture.opacity[pixel] = opacity;
                     picture.end[pixel] = result.end;
+                    if let Some(work) = picture.ray_work.get_mut(pixel) {
+                        *work = result.work;
+                    }
                 }
             }
         })
@@ -255,11 +304,22 @@ impl Prepared<'_> {
             end: vec![0.0; pixels],
             base: view.base(),
             work: Work::default(),
+            ray_work: match options.counts {
+                Counts::Total => Vec::new(),
+                Counts::PerRay => vec![RayWork::default(); pixels],
+            },
         };
         let is_plain = self.appearance.is_plain();
         let (appearance, surfaces) = (&self.appearance, &self.surfaces);
         let details = (!is_plain)
             .then(|| Details::new(appearance, surfaces, &self.baked, volume, options.step));
+        // Between two samples beside a missing value anything might be.
+        let needs_front = details.as_ref().is_some_and(Details::needs_front);
+        let skipping = if needs_front && volume.missing() > 0 {
+            Skipping::None
+        } else {
+            options.skipping
+        };
         let frame = Frame {
             volume,
             layout,
@@ -267,10 +327,16 @@ impl Prepared<'_> {
             table: &self.baked.table(options.step),
             termination: options.termination,
             behind: options.behind,
-            distances: match options.skipping {
-                Skipping::None => None,
+            distances: match skipping {
                 Skipping::Distance => Some(&self.distances),
+                Skipping::None | Skipping::Enclosure => None,
             },
+            enclosure: match (skipping, &self.enclosure) {
+                (Skipping::Enclosure, None) => return Err(CastError::NotEnclosed),
+                (Skipping::Enclosure, enclosure) => enclosure.as_ref(),
+                _ => None,
+            },
+            counts: options.counts,
             details: details.as_ref(),
         };
         cast(&frame, &mut picture);

@@ -20,6 +20,8 @@ pub struct CastOptions {
     pub skipping: Skipping,
     /// Whether samples are moved along their rays.
     pub jitter: Jitter,
+    /// Whether the work of each ray is told. Changes no pixel.
+    pub counts: Counts,
     /// The instruction set. Changes no pixel.
     pub isa: Isa,
 }
@@ -33,6 +35,7 @@ impl Default for CastOptions {
             clip: None,
             skipping: Skipping::Distance,
             jitter: Jitter::None,
+            counts: Counts::Total,
             isa: Isa::best(),
         }
     }
@@ -79,6 +82,19 @@ pub enum Skipping {
     None,
     /// By the distance to the next block in which something can be seen.
     Distance,
+    /// By a tree around what can be seen, of [`Prepared::enclose`](super::Prepared::enclose): its hull
+    /// or all segments of a ray.
+    Enclosure,
+}
+
+/// Whose work is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Counts {
+    /// That of all rays together.
+    Total,
+    /// That of each ray too.
+    PerRay,
 }
 
 /// Whether samples are moved along their rays.
@@ -114,6 +130,9 @@ pub enum CastError {
         /// The threshold.
         termination: f32,
     },
+    /// Empty space is to be left out by an enclosure, and there is none.
+    #[error("there is no enclosure to skip by: build one first")]
+    NotEnclosed,
     /// A corner of the clip box is not a number.
     #[error("a clip box from {min} to {max}: its corners must be numbers")]
     Clip {

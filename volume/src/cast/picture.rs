@@ -12,8 +12,11 @@ pub struct Work {
     pub samples: u64,
     /// Samples of which something is seen.
     pub lit_samples: u64,
-    /// Jumps over empty space.
+    /// Jumps over empty space; by an enclosure, intervals in which rays are followed.
     pub skips: u64,
+    /// Turns of the loops in which all lanes of an instruction set take part, each a jump or one or two
+    /// samples per lane. The fewer for the samples, the fuller the lanes.
+    pub packet_steps: u64,
 }
 
 impl Work {
@@ -23,7 +26,18 @@ impl Work {
         self.samples += other.samples;
         self.lit_samples += other.lit_samples;
         self.skips += other.skips;
+        self.packet_steps += other.packet_steps;
     }
+}
+
+/// What one ray took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct RayWork {
+    /// As in [`Work::samples`].
+    pub samples: u32,
+    /// As in [`Work::skips`].
+    pub skips: u32,
 }
 
 /// A picture of a volume.
@@ -42,4 +56,6 @@ pub struct Picture {
     pub base: f64,
     /// What it took.
     pub work: Work,
+    /// What each pixel took, row by row; empty unless [`Counts::PerRay`](super::Counts) asks for it.
+    pub ray_work: Vec<RayWork>,
 }

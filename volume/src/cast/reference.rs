@@ -35,6 +35,7 @@ pub(crate) fn cast(frame: &Frame<'_>, x: u32, y: u32) -> RayResult {
         front = value;
         k += 1.0;
         ray.end = k + lattice.number;
+        ray.work.samples += 1;
         if ray.opacity > frame.termination {
             break;
         }

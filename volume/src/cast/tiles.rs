@@ -20,8 +20,11 @@ pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
     let colours = picture.image.pixels_mut().par_chunks_mut(band);
     let opacities = picture.opacity.par_chunks_mut(band);
     let ends = picture.end.par_chunks_mut(band);
-    let bands = colours.zip(opacities).zip(ends).enumerate();
-    bands.for_each(|(band, ((colours, opacities), ends))| {
+    // One chunk for each band, empty if nobody asked.
+    let mut ray_work = Vec::from_iter(picture.ray_work.chunks_mut(band));
+    ray_work.resize_with(height.div_ceil(TILE_SIZE) as usize, Default::default);
+    let bands = colours.zip(opacities).zip(ends).zip(ray_work).enumerate();
+    bands.for_each(|(band, (((colours, opacities), ends), ray_work))| {
         let top = band as u32 * TILE_SIZE;
         let rows = top..(top + TILE_SIZE).min(height);
         let mut work = Work::default();
@@ -45,6 +48,9 @@ pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
                     colours[pixel] = colour;
                     opacities[pixel] = opacity;
                     ends[pixel] = result.end;
+                    if let Some(work) = ray_work.get_mut(pixel) {
+                        *work = result.work;
+                    }
                 }
             }
         }

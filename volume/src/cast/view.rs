@@ -102,14 +102,7 @@ impl View {
     ) -> Result<Self, CastError> {
         let (dims, spacing) = (volume.dims(), volume.spacing());
         let last_voxel = dims.map(|n| (n - 1) as f32);
-        let sides = dims.map(|n| {
-            // A single layer has the thickness of one voxel.
-            if n == 1 {
-                [-0.5, 0.5]
-            } else {
-                [0.0, (n - 1) as f32]
-            }
-        });
+        let sides = sides(volume);
         let low: [f32; 3] = std::array::from_fn(|axis| {
             let low = sides[axis][0];
             clip.map_or(low, |clip| low.max(clip.min[axis] / spacing[axis]))
@@ -281,6 +274,18 @@ impl ExactRays {
             number: (base - self.base) as f32,
         }
     }
+}
+
+/// Where there are samples along each axis, in voxels.
+pub(crate) fn sides(volume: &Volume) -> [[f32; 2]; 3] {
+    volume.dims().map(|n| {
+        // A single layer has the thickness of one voxel.
+        if n == 1 {
+            [-0.5, 0.5]
+        } else {
+            [0.0, (n - 1) as f32]
+        }
+    })
 }
 
 /// Where a ray is inside a box, in samples; the first is larger if it is not.

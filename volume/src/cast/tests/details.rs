@@ -4,7 +4,7 @@ use super::*;
 use crate::appearance::{Interpolation, Light, Shading};
 
 /// Everything that can be asked for, alone and together.
-fn appearances(volume: &Volume, function: &TransferFunction) -> Vec<Appearance> {
+pub(super) fn appearances(volume: &Volume, function: &TransferFunction) -> Vec<Appearance> {
     let [low, high] = volume.range();
     let surface = |share: f32, opacity| IsoSurface {
         value: low + (high - low) * share,

@@ -5,11 +5,12 @@ mod geometry;
 
 use glam::Vec3;
 use proptest::prelude::*;
-use raywright_bvh::{Aabb, Isa};
+use raywright_bvh::{Aabb, BuildParams, Isa, Quality};
 use raywright_imaging::{AnyCamera, Camera};
 
 use super::*;
 use crate::{
+    enclosure::EnclosureKind,
     grid::{ValueScale, Voxels},
     transfer::ControlPoint,
 };
@@ -112,10 +113,15 @@ fn check_appearance(
         step,
         ..CastOptions::default()
     };
-    let prepared = caster.prepare_appearance(appearance.clone()).unwrap();
+    let mut prepared = caster.prepare_appearance(appearance.clone()).unwrap();
     let expected = prepared.render_slowly(camera, size, &options).unwrap();
-    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-        for skipping in [Skipping::None, Skipping::Distance] {
+    for (skipping, enclosure) in ways_to_skip() {
+        if let Some(enclosure) = &enclosure {
+            prepared
+                .enclose(enclosure, &mut BuildWorkspace::default())
+                .unwrap();
+        }
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             let options = CastOptions {
                 isa,
                 skipping,
@@ -127,12 +133,119 @@ fn check_appearance(
                 assert_eq!(
                     of(&picture),
                     of(&expected),
-                    "pixel {i}, {isa}, {skipping:?}, {appearance:?}"
+                    "pixel {i}, {isa}, {skipping:?}, {enclosure:?}, {appearance:?}"
                 );
             }
         }
     }
     expected
+}
+
+/// All ways to leave out empty space, with trees of several kinds.
+fn ways_to_skip() -> Vec<(Skipping, Option<EnclosureParams>)> {
+    let mut ways = vec![(Skipping::None, None), (Skipping::Distance, None)];
+    for kind in [EnclosureKind::Hull, EnclosureKind::Segments] {
+        for (block_edge, branching_factor, quality) in
+            [(4, 8, Quality::BinnedSah), (8, 2, Quality::Morton)]
+        {
+            let mut params = EnclosureParams::new(kind);
+            params.block_edge = block_edge;
+            params.build.branching_factor = branching_factor;
+            params.build.quality = quality;
+            ways.push((Skipping::Enclosure, Some(params)));
+        }
+    }
+    ways
+}
+
+#[test]
+fn an_enclosure_is_asked_for_before_it_is_used() {
+    let volume = &volumes([20, 17, 31], [1.0; 3], 3)[0];
+    let caster = Raycaster::new(volume).unwrap();
+    let mut prepared = caster.prepare(&functions(volume)[0]);
+    let camera = Camera::new(Vec3::splat(60.0), Vec3::splat(9.0), Vec3::Z, 30.0).unwrap();
+    let options = CastOptions {
+        skipping: Skipping::Enclosure,
+        ..CastOptions::default()
+    };
+    let render = |prepared: &Prepared<'_>| prepared.render(camera, [8, 8], &options);
+    assert_eq!(render(&prepared), Err(CastError::NotEnclosed));
+    let mut workspace = BuildWorkspace::default();
+    for block_edge in [0, 2, 12] {
+        let mut params = EnclosureParams::new(EnclosureKind::Hull);
+        params.block_edge = block_edge;
+        let error = prepared.enclose(&params, &mut workspace).unwrap_err();
+        let least = 4;
+        assert_eq!(error, EnclosureError::BlockEdge { block_edge, least });
+    }
+    let mut params = EnclosureParams::new(EnclosureKind::Segments);
+    params.build = BuildParams::default();
+    params.build.branching_factor = 99;
+    assert!(matches!(
+        prepared.enclose(&params, &mut workspace),
+        Err(EnclosureError::Build(_))
+    ));
+    params.build = BuildParams::default();
+    params.block_edge = 4;
+    let stats = prepared.enclose(&params, &mut workspace).unwrap();
+    assert!(stats.nodes > 0);
+    assert!(render(&prepared).is_ok());
+}
+
+#[test]
+fn the_work_of_rays_is_that_of_the_picture() {
+    let volume = &volumes([20, 17, 31], [1.0, 1.5, 0.7], 3)[0];
+    let caster = Raycaster::new(volume).unwrap();
+    let extent = volume.extent();
+    let eye = extent * 0.5 + Vec3::new(50.0, -30.0, 20.0);
+    let camera = Camera::new(eye, extent * 0.5, Vec3::Z, 40.0).unwrap();
+    for appearance in appearances_with_plain(volume) {
+        let mut prepared = caster.prepare_appearance(appearance).unwrap();
+        for (skipping, enclosure) in ways_to_skip() {
+            if let Some(enclosure) = &enclosure {
+                prepared
+                    .enclose(enclosure, &mut BuildWorkspace::default())
+                    .unwrap();
+            }
+            for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+                let mut options = CastOptions {
+                    isa,
+                    skipping,
+                    ..CastOptions::default()
+                };
+                let total = prepared.render(camera, [41, 35], &options).unwrap();
+                options.counts = Counts::PerRay;
+                let counted = prepared.render(camera, [41, 35], &options).unwrap();
+                let slow = prepared.render_slowly(camera, [41, 35], &options).unwrap();
+                assert_eq!((&counted.image, counted.work), (&total.image, total.work));
+                assert!(total.ray_work.is_empty());
+                let sum = |of: fn(&RayWork) -> u32| {
+                    counted
+                        .ray_work
+                        .iter()
+                        .map(|work| u64::from(of(work)))
+                        .sum::<u64>()
+                };
+                assert_eq!(sum(|work| work.samples), total.work.samples);
+                assert_eq!(sum(|work| work.skips), total.work.skips);
+                assert!(total.work.packet_steps > 0);
+                for (fast, slow) in counted.ray_work.iter().zip(&slow.ray_work) {
+                    // The second sample of a pair may be one too many.
+                    match skipping {
+                        Skipping::None => assert!(fast.samples.abs_diff(slow.samples) <= 1),
+                        _ => assert!(fast.samples <= slow.samples + 1),
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn appearances_with_plain(volume: &Volume) -> Vec<Appearance> {
+    let function = &functions(volume)[0];
+    let mut all = details::appearances(volume, function);
+    all.push(function.clone().into());
+    all
 }
 
 #[test]
