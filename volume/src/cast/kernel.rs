@@ -45,10 +45,10 @@ impl<V: Voxel> LaneKernel for TileKernel<'_, V> {
         match (self.frame.details, self.frame.distances, is_counted) {
             (Some(details), _, false) => self.cast_detailed::<N, L, false>(queue, details),
             (Some(details), _, true) => self.cast_detailed::<N, L, true>(queue, details),
-            (None, Some(_), false) => self.cast::<N, L, true, false>(queue),
-            (None, Some(_), true) => self.cast::<N, L, true, true>(queue),
-            (None, None, false) => self.cast::<N, L, false, false>(queue),
-            (None, None, true) => self.cast::<N, L, false, true>(queue),
+            (None, Some(_), false) => self.cast::<N, L, true, false, false>(queue),
+            (None, Some(_), true) => self.cast::<N, L, true, false, true>(queue),
+            (None, None, false) => self.cast::<N, L, false, true, false>(queue),
+            (None, None, true) => self.cast::<N, L, false, true, true>(queue),
         }
     }
 }
@@ -169,7 +169,13 @@ impl<V: Voxel> TileKernel<'_, V> {
     }
 
     #[inline(always)]
-    fn cast<const N: usize, L: GatherLanes<N>, const SKIP: bool, const COUNT: bool>(
+    fn cast<
+        const N: usize,
+        L: GatherLanes<N>,
+        const SKIP: bool,
+        const PARTS: bool,
+        const COUNT: bool,
+    >(
         self,
         mut queue: Queue,
     ) {
@@ -189,7 +195,7 @@ impl<V: Voxel> TileKernel<'_, V> {
 
         let mut lanes = LaneStates::<N>::idle();
         let mut work = Work::default();
-        while let Some(enough) = lanes.refill(&mut queue, *termination, self.results) {
+        while let Some(enough) = lanes.refill::<PARTS>(&mut queue, *termination, self.results) {
             let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),

@@ -70,10 +70,11 @@ impl<const N: usize> LaneStates<N> {
         }
     }
 
-    /// Idle lanes go on with the next interval of their rays, or give their results and take the next
-    /// rays. Returns how many lanes must stay busy until the next time; `None` if all is done.
+    /// Idle lanes go on with the next interval of their rays, where rays have `PARTS`, or give their
+    /// results and take the next rays. Returns how many lanes must stay busy until the next time;
+    /// `None` if all is done.
     #[inline(always)]
-    pub(crate) fn refill(
+    pub(crate) fn refill<const PARTS: bool>(
         &mut self,
         queue: &mut Queue,
         termination: f32,
@@ -83,22 +84,30 @@ impl<const N: usize> LaneStates<N> {
         for lane in 0..N {
             if self.k[lane] <= self.last[lane] {
                 busy += 1;
-                is_more |= self.intervals[lane][0] < self.intervals[lane][1];
+                is_more |= PARTS && self.intervals[lane][0] < self.intervals[lane][1];
                 continue;
             }
             if self.pixel[lane] != NO_PIXEL {
-                let is_opaque = self.opacity[lane] > termination;
-                if !is_opaque && self.take_interval(lane, queue) {
-                    busy += 1;
-                    continue;
+                let mut last = self.last[lane];
+                if PARTS && self.opacity[lane] <= termination {
+                    if self.take_interval(lane, queue) {
+                        busy += 1;
+                        continue;
+                    }
+                    last = self.ray_last[lane];
                 }
-                results[self.pixel[lane] as usize] = self.result(lane, is_opaque);
+                results[self.pixel[lane] as usize] = self.result(lane, last);
                 self.pixel[lane] = NO_PIXEL;
             }
             if let Some(ray) = queue.rays.get(queue.next) {
                 queue.next += 1;
                 self.take(lane, ray);
-                self.take_interval(lane, queue);
+                if PARTS {
+                    self.ray_last[lane] = ray.samples.last;
+                    self.intervals[lane] = ray.intervals;
+                    self.skips[lane] = (ray.intervals[1] - ray.intervals[0]) as f32;
+                    self.take_interval(lane, queue);
+                }
                 busy += 1;
             }
         }
@@ -131,11 +140,9 @@ impl<const N: usize> LaneStates<N> {
         self.number[lane] = samples.number;
         self.k[lane] = samples.first;
         self.last[lane] = samples.last;
-        self.ray_last[lane] = samples.last;
         self.pixel[lane] = ray.pixel;
-        self.intervals[lane] = ray.intervals;
         self.samples[lane] = 0.0;
-        self.skips[lane] = (ray.intervals[1] - ray.intervals[0]) as f32;
+        self.skips[lane] = 0.0;
     }
 
     /// Goes on with the next interval of a ray, if there is one.
@@ -152,12 +159,7 @@ impl<const N: usize> LaneStates<N> {
     }
 
     #[inline(always)]
-    fn result(&self, lane: usize, is_opaque: bool) -> RayResult {
-        let last = if is_opaque {
-            self.last[lane]
-        } else {
-            self.ray_last[lane]
-        };
+    fn result(&self, lane: usize, last: f32) -> RayResult {
         RayResult {
             colour: [
                 self.colour[0][lane],
