@@ -1,8 +1,11 @@
 //! `raywright volume`: subcommands about volumes, one file each, and what they share.
 
+mod aim;
 mod info;
 mod look;
+mod maps;
 mod render;
+mod skip;
 mod source;
 
 use clap::Subcommand;
@@ -14,6 +17,7 @@ pub(crate) enum VolumeCommand {
     /// Show sizes, type, values, orientation and faults of a volume
     Info(info::InfoArgs),
     /// Render a picture of a volume, or the frames of an orbit around it
+    #[command(after_long_help = crate::cli::run_options::parameter_help())]
     Render(Box<render::RenderArgs>),
 }
 

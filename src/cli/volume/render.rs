@@ -9,27 +9,21 @@ use std::{
 use clap::{Args, ValueEnum};
 use raywright::{
     bvh::{Aabb, Vec3},
-    imaging::{Camera, Display, ToneCurve, write_image, write_png},
-    volume::{
-        Behind, CastOptions, Picture, Raycaster, Skipping, Statistics, TransferFunction, View,
-        Volume, Work, presets,
-        view::{overview, read_transfer_function},
-    },
+    imaging::{AnyCamera, Display, Image, ToneCurve, write_image, write_png},
+    volume::{Behind, CastOptions, Counts, Jitter, Raycaster, Work},
 };
 
-use super::{look::LookOptions, source::VolumeOptions};
+use super::{
+    aim::AimOptions,
+    look::LookOptions,
+    maps::{Maps, Method, Show},
+    skip::SkipOptions,
+    source::VolumeOptions,
+};
 use crate::cli::{
     Failure, output,
     run_options::{RunOptions, cancel_on_interrupt},
 };
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Skip {
-    /// Take every sample of the box
-    None,
-    /// Jump by the distance to what can be seen
-    Distance,
-}
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum BehindEnd {
@@ -43,21 +37,16 @@ enum BehindEnd {
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     volume: VolumeOptions,
-    /// Transfer function: a name in VOLUME.view.json, a file of points, or a preset (ramp, fire, soft-tissue, bone, surface); by default the first of the view file, `own` of a generated volume, or ramp
-    #[arg(long, value_name = "NAME|FILE")]
-    tf: Option<String>,
+    #[command(flatten)]
+    aim: AimOptions,
     #[command(flatten)]
     look: LookOptions,
-    /// Camera: a name in VOLUME.view.json, or nine numbers: position, target, up; by default the whole volume
-    #[arg(
-        long,
-        value_name = "NAME|X,Y,Z,X,Y,Z,X,Y,Z",
-        allow_hyphen_values = true
-    )]
-    camera: Option<String>,
-    /// Vertical field of view of a camera of nine numbers, degrees
-    #[arg(long, default_value_t = 30.0)]
-    fov: f32,
+    /// What to show
+    #[arg(long, value_enum, default_value_t = Show::Colours)]
+    show: Show,
+    /// How the end of rays is estimated, where that is shown
+    #[arg(long, value_enum, default_value_t = Method::Mean)]
+    estimate: Method,
     /// Where the picture goes: .png, or .exr or .pfm with the colours of the transfer function as they are (default: VOLUME.png in the current folder); --orbit adds -0000 and so on to the name
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -79,9 +68,11 @@ pub(crate) struct RenderArgs {
     /// Show only what is between two corners, in units of the spacing
     #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true)]
     clip: Option<String>,
-    /// How empty space is left out; changes no pixel
-    #[arg(long, value_enum, default_value_t = Skip::Distance)]
-    skipping: Skip,
+    /// Move the samples of each pixel by a share of a step of its own: rings become noise
+    #[arg(long)]
+    jitter: bool,
+    #[command(flatten)]
+    skip: SkipOptions,
     /// Render so many frames around the target of the camera
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..))]
     orbit: Option<u32>,
@@ -120,12 +111,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let cancel = cancel_on_interrupt()?;
     args.run.install(|| {
         let stage = args.volume.prepare()?;
-        let view = match &stage.view {
-            Some(view) => Some(view.clone()),
-            None => view_of(&args.volume.volume)?,
-        };
-        let (tf_name, function) = transfer_function(args, &stage.volume, view.as_ref())?;
-        let (camera_name, camera) = camera(args, &stage.volume, view.as_ref())?;
+        let aim = args.aim.at(&stage, &args.volume.volume)?;
         let mut options = CastOptions::default();
         options.step = args.step;
         options.termination = args.termination;
@@ -135,12 +121,18 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             BehindEnd::Nothing => Behind::Nothing,
         };
         options.clip = args.clip.as_deref().map(clip_box).transpose()?;
-        options.skipping = match args.skipping {
-            Skip::None => Skipping::None,
-            Skip::Distance => Skipping::Distance,
-        };
+        if args.jitter {
+            options.jitter = Jitter::PerPixel;
+        }
         let caster = Raycaster::new(&stage.volume)?;
-        let prepared = caster.prepare_appearance(args.look.appearance(function)?)?;
+        let appearance = args.look.appearance(aim.function.clone())?;
+        let mut prepared = caster.prepare_appearance(appearance)?;
+        args.skip.apply(&mut prepared, &mut options)?;
+        let maps = args
+            .show
+            .map()
+            .map(|map| Maps::new(map, &stage.volume, &aim.function, args.estimate.into()));
+        options.counts = maps.as_ref().map_or(Counts::Total, Maps::counts);
         let path = args
             .output
             .clone()
@@ -152,13 +144,16 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             if cancel.is_cancelled() {
                 break;
             }
-            let turned = orbited(&camera, frame as f32 / frames as f32);
+            let turned = orbited(aim.camera, frame as f32 / frames as f32);
             let start = Instant::now();
-            let picture = prepared.render(&turned, [args.width, args.height], &options)?;
+            let picture = prepared.render(turned, [args.width, args.height], &options)?;
             time += start.elapsed();
             work.add(&picture.work);
-            let numbered = args.orbit.map(|_| frame);
-            write(&picture, &path, numbered)?;
+            let image = match &maps {
+                Some(maps) => maps.draw(&picture, turned, &options)?,
+                None => picture.image,
+            };
+            write(&image, &path, args.orbit.map(|_| frame))?;
             done += 1;
             bar.inc(1);
         }
@@ -169,8 +164,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             output::json(&Report {
                 schema_version: 1,
                 volume: args.volume.volume.clone(),
-                transfer_function: tf_name,
-                camera: camera_name,
+                transfer_function: aim.function_name,
+                camera: aim.camera_name,
                 output: path,
                 frames: done,
                 width: args.width,
@@ -189,9 +184,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         } else {
             let end = if interrupted { " (interrupted)" } else { "" };
             output::line(format_args!(
-                "{}: {done} of {frames} frames, {render_ms:.1} ms, {:.2} million samples, {tf_name}, {camera_name}{end}",
+                "{}: {done} of {frames} frames, {render_ms:.1} ms, {:.2} million samples, {}, {}{end}",
                 path.display(),
                 work.samples as f64 / 1e6,
+                aim.function_name,
+                aim.camera_name,
             ))?;
         }
         if interrupted {
@@ -229,111 +226,20 @@ fn stem(volume: &str) -> String {
         .to_owned()
 }
 
-/// The view file beside a volume, if there is one.
-fn view_of(volume: &str) -> Result<Option<View>, Failure> {
-    let path = View::path_for(Path::new(volume));
-    if path.is_file() {
-        Ok(Some(View::read(&path)?))
-    } else {
-        Ok(None)
-    }
-}
-
-fn transfer_function(
-    args: &RenderArgs,
-    volume: &Volume,
-    view: Option<&View>,
-) -> Result<(String, TransferFunction), Failure> {
-    let of_view = view.map(|view| &view.transfer_functions);
-    let Some(name) = &args.tf else {
-        if let Some((name, function)) = of_view.and_then(|all| all.first_key_value()) {
-            return Ok((name.clone(), function.clone()));
-        }
-        return Ok(("ramp".into(), named_preset("ramp", volume)?));
-    };
-    if let Some(function) = of_view.and_then(|all| all.get(name)) {
-        return Ok((name.clone(), function.clone()));
-    }
-    if Path::new(name).is_file() {
-        return Ok((name.clone(), read_transfer_function(Path::new(name))?));
-    }
-    named_preset(name, volume)
-        .map(|function| (name.clone(), function))
-        .map_err(|failure| {
-            let known = of_view.map(|all| all.keys().cloned().collect::<Vec<_>>().join(", "));
-            match (failure, known) {
-                (Failure::Error { error, hint }, Some(known)) => Failure::with_hint(
-                    error,
-                    format!("this volume has {known}; {}", hint.unwrap_or_default()),
-                ),
-                (failure, _) => failure,
-            }
-        })
-}
-
-fn named_preset(name: &str, volume: &Volume) -> Result<TransferFunction, Failure> {
-    let window = presets::window(volume, &Statistics::of(volume));
-    presets::preset(name, window).ok_or_else(|| {
-        let names: Vec<&str> = presets::PRESETS.iter().map(|(name, _)| *name).collect();
-        Failure::with_hint(
-            anyhow::anyhow!("there is no transfer function {name}"),
-            format!("presets are {}; or give a file of points", names.join(", ")),
-        )
-    })
-}
-
-fn camera(
-    args: &RenderArgs,
-    volume: &Volume,
-    view: Option<&View>,
-) -> Result<(String, Camera), Failure> {
-    let of_view = view.map(|view| &view.cameras);
-    let Some(name) = &args.camera else {
-        let camera = of_view.and_then(|all| all.get("overview")).copied();
-        return Ok((
-            "overview".into(),
-            camera.unwrap_or_else(|| overview(volume)),
-        ));
-    };
-    if let Some(camera) = of_view.and_then(|all| all.get(name)) {
-        return Ok((name.clone(), *camera));
-    }
-    if name == "overview" {
-        return Ok((name.clone(), overview(volume)));
-    }
-    let numbers: Result<Vec<f32>, _> = name.split(',').map(|n| n.trim().parse()).collect();
-    let numbers = numbers.unwrap_or_default();
-    let Ok([a, b, c, d, e, f, g, h, i]) = <[f32; 9]>::try_from(numbers) else {
-        let known = of_view.map_or("overview".into(), |all| {
-            all.keys().cloned().collect::<Vec<_>>().join(", ")
-        });
-        return Err(Failure::with_hint(
-            anyhow::anyhow!("there is no camera {name}"),
-            format!("this volume has {known}; or give nine numbers: position, target, up"),
-        ));
-    };
-    let [origin, target, up] = [[a, b, c], [d, e, f], [g, h, i]].map(Vec3::from);
-    Ok((name.clone(), Camera::new(origin, target, up, args.fov)?))
-}
-
 /// The camera turned around its target, about its up direction, by a share of a full turn.
-fn orbited(camera: &Camera, turn: f32) -> Camera {
-    let axis = camera.up.normalize_or_zero();
+fn orbited(camera: AnyCamera, turn: f32) -> AnyCamera {
+    if turn == 0.0 {
+        return camera;
+    }
+    let axis = camera.up().normalize_or_zero();
     let (sine, cosine) = (turn * TAU).sin_cos();
-    let arm = camera.origin - camera.target;
+    let arm = camera.origin() - camera.target();
     // Rodrigues's formula.
     let turned = arm * cosine + axis.cross(arm) * sine + axis * axis.dot(arm) * (1.0 - cosine);
-    Camera {
-        origin: if turn == 0.0 {
-            camera.origin
-        } else {
-            camera.target + turned
-        },
-        ..*camera
-    }
+    camera.with_origin(camera.target() + turned)
 }
 
-fn write(picture: &Picture, path: &Path, frame: Option<u32>) -> Result<(), Failure> {
+fn write(image: &Image, path: &Path, frame: Option<u32>) -> Result<(), Failure> {
     let path = match frame {
         None => path.to_owned(),
         Some(frame) => {
@@ -349,27 +255,30 @@ fn write(picture: &Picture, path: &Path, frame: Option<u32>) -> Result<(), Failu
     };
     match path.extension() {
         Some(ending) if ending.eq_ignore_ascii_case("png") => {
-            write_png(&path, &picture.image, &screen)?;
+            write_png(&path, image, &screen)?;
         }
-        _ => write_image(&path, &picture.image)?,
+        _ => write_image(&path, image)?,
     }
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use raywright::imaging::Camera;
+
     use super::*;
 
     #[test]
     fn an_orbit_keeps_distance_and_height_and_comes_back() {
         let camera = Camera::new(Vec3::new(3.0, 1.0, 2.0), Vec3::ZERO, Vec3::Z, 30.0).unwrap();
-        assert_eq!(orbited(&camera, 0.0), camera);
-        let quarter = orbited(&camera, 0.25).origin;
+        let camera = AnyCamera::from(camera);
+        assert_eq!(orbited(camera, 0.0), camera);
+        let quarter = orbited(camera, 0.25).origin();
         assert!(
             (quarter - Vec3::new(-1.0, 3.0, 2.0)).length() < 1e-5,
             "{quarter}"
         );
-        assert!((orbited(&camera, 1.0).origin - camera.origin).length() < 1e-5);
+        assert!((orbited(camera, 1.0).origin() - camera.origin()).length() < 1e-5);
     }
 
     #[test]
