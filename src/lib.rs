@@ -27,5 +27,7 @@ pub use raywright_volume as volume;
 
 #[cfg(feature = "cli")]
 pub mod report;
+#[cfg(all(feature = "volume", feature = "cli"))]
+pub mod study;
 #[cfg(all(feature = "tracer", feature = "tuner"))]
 pub mod tune;

@@ -76,6 +76,44 @@ impl Image {
         self.pixels[index] = rgb;
     }
 
+    /// The same picture with other sides: between the centres of pixels linear along both axes, and
+    /// constant beyond those at the border.
+    ///
+    /// # Errors
+    ///
+    /// As [`Image::new`].
+    pub fn resized(&self, width: u32, height: u32) -> Result<Image, FilmError> {
+        let mut image = Image::new(width, height)?;
+        // For each pixel along a side: the pixels on both sides of its centre, and the share of the second.
+        let sources = |from: u32, to: u32| -> Vec<(u32, u32, f32)> {
+            let source = |i: u32| {
+                let place = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to) - 0.5;
+                let place = place.clamp(0.0, f64::from(from - 1));
+                let first = place as u32;
+                (
+                    first,
+                    (first + 1).min(from - 1),
+                    (place - f64::from(first)) as f32,
+                )
+            };
+            (0..to).map(source).collect()
+        };
+        let columns = sources(self.width, width);
+        for (y, (above, below, down)) in sources(self.height, height).into_iter().enumerate() {
+            let start = y * width as usize;
+            let row = &mut image.pixels[start..start + width as usize];
+            for (pixel, &(left, right, across)) in row.iter_mut().zip(&columns) {
+                let mixed = |a: [f32; 3], b: [f32; 3], share: f32| -> [f32; 3] {
+                    std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share)
+                };
+                let top = mixed(self.get(left, above), self.get(right, above), across);
+                let bottom = mixed(self.get(left, below), self.get(right, below), across);
+                *pixel = mixed(top, bottom, down);
+            }
+        }
+        Ok(image)
+    }
+
     /// Mean of each channel over the picture.
     pub fn mean(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
@@ -116,6 +154,31 @@ mod tests {
         image.set(0, 0, [4.0, 0.0, 2.0]);
         image.set(1, 1, [4.0, 0.0, -6.0]);
         assert_eq!(image.mean(), [2.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn resizing_keeps_what_is_linear() {
+        let mut image = Image::new(8, 6).unwrap();
+        for y in 0..6 {
+            for x in 0..8 {
+                image.set(x, y, [x as f32 + 0.5, y as f32 + 0.5, 3.0]);
+            }
+        }
+        assert_eq!(image.resized(8, 6).unwrap(), image);
+        let large = image.resized(32, 12).unwrap();
+        for y in 1..11 {
+            for x in 2..30 {
+                let [r, g, b] = large.get(x, y);
+                let expected = [(x as f32 + 0.5) / 4.0, (y as f32 + 0.5) / 2.0];
+                assert!((r - expected[0]).abs() < 1e-5 && (g - expected[1]).abs() < 1e-5);
+                assert_eq!(b, 3.0);
+            }
+        }
+        // Beyond the outermost centres there is nothing to go by.
+        assert_eq!(large.get(0, 0), image.get(0, 0));
+        assert_eq!(large.get(31, 11), image.get(7, 5));
+        assert!(image.resized(0, 3).is_err());
+        assert_eq!(image.resized(1, 1).unwrap().pixels(), [[4.0, 3.0, 3.0]]);
     }
 
     #[test]

@@ -45,6 +45,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod difference;
 pub mod files;
 pub mod film;
 pub mod image;
@@ -55,6 +56,7 @@ pub mod tiles;
 pub mod tone;
 
 pub use crate::camera::{Camera, CameraError, Projection};
+pub use crate::difference::Difference;
 pub use crate::files::{
     ImageError, PfmError, read_exr, read_pfm, write_exr, write_image, write_pfm, write_png,
 };

@@ -8,7 +8,7 @@
 
 mod base64;
 mod plots;
-mod table;
+pub(super) mod table;
 mod tables;
 mod trials;
 mod verdict;
@@ -192,14 +192,14 @@ fn indicators(run: &RunRecord) -> String {
 }
 
 /// `content` is HTML, `caption` is text.
-fn figure(content: &str, caption: &str) -> String {
+pub(super) fn figure(content: &str, caption: &str) -> String {
     format!(
         "<figure><div class=\"scroll\" tabindex=\"0\">{content}</div>\n<figcaption>{}</figcaption></figure>\n",
         escape(caption)
     )
 }
 
-fn document(title: &str, body: &str) -> String {
+pub(super) fn document(title: &str, body: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\

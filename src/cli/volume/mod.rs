@@ -7,6 +7,7 @@ mod maps;
 mod render;
 mod skip;
 mod source;
+mod tradeoff;
 
 use clap::Subcommand;
 
@@ -19,6 +20,8 @@ pub(crate) enum VolumeCommand {
     /// Render a picture of a volume, or the frames of an orbit around it
     #[command(after_long_help = crate::cli::run_options::parameter_help())]
     Render(Box<render::RenderArgs>),
+    /// Measure what step, termination, interpolation and resolution cost and give, and recommend a setting
+    Tradeoff(Box<tradeoff::TradeoffArgs>),
 }
 
 /// Runs a subcommand.
@@ -26,5 +29,6 @@ pub(crate) fn run(command: &VolumeCommand) -> Result<(), Failure> {
     match command {
         VolumeCommand::Info(args) => info::run(args),
         VolumeCommand::Render(args) => render::run(args),
+        VolumeCommand::Tradeoff(args) => tradeoff::run(args),
     }
 }

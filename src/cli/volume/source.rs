@@ -60,6 +60,11 @@ pub(crate) struct VolumeStage {
 }
 
 impl VolumeOptions {
+    /// The name of the volume without folder and endings.
+    pub(crate) fn stem(&self) -> String {
+        stem(&self.volume)
+    }
+
     /// Loads or generates the volume, and tells on standard error what the user should know.
     pub(crate) fn prepare(&self) -> Result<VolumeStage, Failure> {
         let path = Path::new(&self.volume);
@@ -156,6 +161,16 @@ fn triple<T: FromStr>(text: &str) -> Result<[T; 3], String> {
         .ok_or_else(|| "three numbers are needed, as in 256,256,128".into())
 }
 
+fn stem(volume: &str) -> String {
+    let name = Path::new(volume).file_name().unwrap_or_default();
+    let name = name.to_string_lossy();
+    name.split('.')
+        .next()
+        .filter(|s| !s.is_empty())
+        .unwrap_or("volume")
+        .to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,6 +181,17 @@ mod tests {
         assert_eq!(triple("1.5,2,3e-1"), Ok([1.5_f64, 2.0, 0.3]));
         for text in ["1,2", "1,2,3,4", "a,b,c", "-1,2,3", ""] {
             assert!(triple::<u64>(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn names_of_pictures() {
+        for (volume, expected) in [
+            ("a/b/chest.nii.gz", "chest"),
+            ("nebula", "nebula"),
+            (".nrrd", "volume"),
+        ] {
+            assert_eq!(stem(volume), expected);
         }
     }
 }

@@ -4,21 +4,21 @@ use crate::report::markup::escape;
 
 /// A cell: text is aligned left, numbers right.
 #[derive(Clone, Debug)]
-pub(super) enum Cell {
+pub(in crate::report) enum Cell {
     Text(String),
     Number(String),
 }
 
 /// Rows below a head. The first cell of a row is its heading.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
-    pub(super) head: Vec<String>,
-    pub(super) rows: Vec<Vec<Cell>>,
+pub(in crate::report) struct Table {
+    pub(in crate::report) head: Vec<String>,
+    pub(in crate::report) rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
     /// The table as an HTML element.
-    pub(super) fn html(&self) -> String {
+    pub(in crate::report) fn html(&self) -> String {
         let mut html = "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>".to_string();
         for (column, title) in self.head.iter().enumerate() {
             let numeric = self.rows.iter().any(|row| {

@@ -1,0 +1,3 @@
+//! Studies: what knobs do, measured. They use the engine as anybody would, and read the clock.
+
+pub mod tradeoff;
