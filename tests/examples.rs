@@ -66,3 +66,18 @@ fn tune_a_build() {
         "incumbents only get better: {printed}"
     );
 }
+
+#[test]
+fn a_volume() {
+    let Some(printed) = run("07_a_volume") else {
+        return;
+    };
+    let numbers: Vec<u64> = printed
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    assert!(
+        numbers.len() == 3 && numbers.iter().all(|&n| n > 0) && numbers[1] > numbers[0],
+        "{printed}"
+    );
+}

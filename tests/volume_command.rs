@@ -256,3 +256,120 @@ fn what_cannot_be_rendered_says_what_may_be_tried() {
         );
     }
 }
+
+/// Renders a small generated volume with these arguments; the bytes of the picture.
+fn picture(folder: &Path, args: &[&str]) -> Vec<u8> {
+    let always = [
+        "volume",
+        "render",
+        "nebula",
+        "--dims",
+        "32,32,32",
+        "--width",
+        "48",
+        "--height",
+        "40",
+        "-o",
+        "picture.png",
+    ];
+    let output = raywright(folder, &[&always[..], args].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    fs::read(folder.join("picture.png")).expect("a picture")
+}
+
+#[test]
+fn trees_around_what_is_seen_change_no_pixel_and_looks_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plain = picture(folder.path(), &[]);
+    for args in [
+        &["--skipping", "hull"][..],
+        &[
+            "--skipping",
+            "segments",
+            "--block-edge",
+            "4",
+            "-D",
+            "branching_factor=2",
+        ],
+        &[
+            "--skipping",
+            "hull",
+            "--block-edge",
+            "8",
+            "-D",
+            "quality=morton",
+        ],
+    ] {
+        assert_eq!(picture(folder.path(), args), plain, "{args:?}");
+    }
+    for args in [
+        &["--jitter"][..],
+        &["--orthographic"],
+        &["--shade"],
+        &["--show", "samples"],
+        &["--show", "termination"],
+        &["--show", "estimated-termination", "--estimate", "cube"],
+        &["--show", "termination-error"],
+    ] {
+        assert_ne!(picture(folder.path(), args), plain, "{args:?}");
+    }
+    let output = raywright(
+        folder.path(),
+        &[
+            "volume",
+            "render",
+            "nebula",
+            "--skipping",
+            "hull",
+            "--block-edge",
+            "5",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("power of two"));
+}
+
+#[test]
+fn a_tradeoff_leaves_a_page_and_a_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = raywright(
+        folder.path(),
+        &[
+            "volume",
+            "tradeoff",
+            "marschner-lobb",
+            "--dims",
+            "24,24,24",
+            "--width",
+            "40",
+            "--height",
+            "32",
+            "--rounds",
+            "1",
+            "--error",
+            "2",
+            "--time",
+            "0",
+            "-o",
+            "out",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let printed = text(&output.stdout);
+    assert!(
+        printed.contains("With an error of at most 2, "),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("No setting takes 0 ms or less."),
+        "{printed}"
+    );
+    let page = folder.path().join("out/marschner-lobb-tradeoff.html");
+    let page = fs::read_to_string(page).expect("a page");
+    assert!(page.contains("<svg") && page.contains("What no other setting beats"));
+    let table = folder.path().join("out/marschner-lobb-tradeoff.csv");
+    let table = fs::read_to_string(table).expect("a table");
+    let columns = table.lines().next().expect("a head").split(',').count();
+    assert!(table.lines().count() > 200);
+    assert!(table.lines().all(|line| line.split(',').count() == columns));
+}
