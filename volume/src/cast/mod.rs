@@ -16,7 +16,7 @@ mod tiles;
 pub(crate) mod view;
 
 use raywright_bvh::{BuildWorkspace, TreeStats};
-use raywright_imaging::{AnyCamera, Image};
+use raywright_imaging::{AnyCamera, Image, PictureFrame};
 
 use crate::{
     appearance::{Appearance, AppearanceError, Integration, IsoSurface},
@@ -32,7 +32,8 @@ use details::{Details, RawSurface};
 use field::Layout;
 pub use options::{Behind, CastError, CastOptions, Counts, Jitter, Skipping};
 pub use picture::{Picture, RayWork, Work};
-use tiles::cast_tiles;
+pub use tiles::parts;
+use tiles::{cast_bands, cast_tiles};
 use view::View;
 
 /// Binary logarithm of the cells along the edge of a block.
@@ -284,31 +285,60 @@ impl Prepared<'_> {
         })
     }
 
+    /// The same picture part by part, with a step for each: before each part `step` is asked, which is
+    /// told the number of the part and the work of those before. [`parts`] says which rows they have.
+    /// Numbers of samples in [`Picture::end`] are those of the part.
+    ///
+    /// # Errors
+    /// As [`Prepared::render`].
+    pub fn render_in_parts(
+        &self,
+        camera: impl Into<AnyCamera>,
+        size: [u32; 2],
+        options: &CastOptions,
+        mut step: impl FnMut(usize, &Work) -> f32,
+    ) -> Result<Picture, CastError> {
+        let rays = camera.into().picture_frame(size[0], size[1])?;
+        let mut picture = blank(size, options)?;
+        let mut work = Work::default();
+        for (part, bands) in tiles::bands_of_parts(&mut picture).into_iter().enumerate() {
+            let mut options = *options;
+            options.step = step(part, &work);
+            work.add(&self.with_frame(&rays, &options, |frame| {
+                cast_bands(frame, size[0], bands, options.isa)
+            })?);
+        }
+        picture.work = work;
+        Ok(picture)
+    }
+
     fn picture(
         &self,
         camera: AnyCamera,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         options: &CastOptions,
         cast: impl FnOnce(&Frame<'_>, &mut Picture),
     ) -> Result<Picture, CastError> {
+        let rays = camera.picture_frame(size[0], size[1])?;
+        let mut picture = blank(size, options)?;
+        self.with_frame(&rays, options, |frame| {
+            picture.base = frame.view.base();
+            cast(frame, &mut picture);
+        })?;
+        Ok(picture)
+    }
+
+    /// Does something with what all rays of a picture read.
+    fn with_frame<R>(
+        &self,
+        rays: &PictureFrame,
+        options: &CastOptions,
+        then: impl FnOnce(&Frame<'_>) -> R,
+    ) -> Result<R, CastError> {
         options.check()?;
         let Raycaster { volume, layout, .. } = self.caster;
-        let rays = camera.picture_frame(width, height)?;
         let clip = options.clip.as_ref();
-        let view = View::new(volume, &rays, options.step, clip, options.jitter)?;
-        let image = Image::new(width, height)?;
-        let pixels = image.pixels().len();
-        let mut picture = Picture {
-            image,
-            opacity: vec![0.0; pixels],
-            end: vec![0.0; pixels],
-            base: view.base(),
-            work: Work::default(),
-            ray_work: match options.counts {
-                Counts::Total => Vec::new(),
-                Counts::PerRay => vec![RayWork::default(); pixels],
-            },
-        };
+        let view = View::new(volume, rays, options.step, clip, options.jitter)?;
         let is_plain = self.appearance.is_plain();
         let (appearance, surfaces) = (&self.appearance, &self.surfaces);
         let details = (!is_plain)
@@ -320,7 +350,7 @@ impl Prepared<'_> {
         } else {
             options.skipping
         };
-        let frame = Frame {
+        Ok(then(&Frame {
             volume,
             layout,
             view,
@@ -338,10 +368,25 @@ impl Prepared<'_> {
             },
             counts: options.counts,
             details: details.as_ref(),
-        };
-        cast(&frame, &mut picture);
-        Ok(picture)
+        }))
     }
+}
+
+/// A picture in which there is nothing yet.
+fn blank([width, height]: [u32; 2], options: &CastOptions) -> Result<Picture, CastError> {
+    let image = Image::new(width, height)?;
+    let pixels = image.pixels().len();
+    Ok(Picture {
+        image,
+        opacity: vec![0.0; pixels],
+        end: vec![0.0; pixels],
+        base: 0.0,
+        work: Work::default(),
+        ray_work: match options.counts {
+            Counts::Total => Vec::new(),
+            Counts::PerRay => vec![RayWork::default(); pixels],
+        },
+    })
 }
 
 #[cfg(test)]

@@ -1,32 +1,97 @@
-//! Pictures tile by tile, on all threads.
+//! Pictures tile by tile, on all threads, at once or part by part.
 //!
-//! Invariant: what a tile is, and who casts it, changes no pixel.
+//! A part is made of bands of rows that are spread over the picture, so that the first parts tell how
+//! long the others will take; the order is that of van der Corput (1935), bits of numbers reversed.
+//!
+//! Invariant: what a tile is, and who casts it and when, changes no pixel.
 
 use std::{ops::Range, sync::Mutex};
 
 use rayon::prelude::*;
 use raywright_bvh::Isa;
 
-use super::{Frame, Picture, RayResult, Work, field::Layout, kernel::TileKernel};
+use super::{Frame, Picture, RayResult, RayWork, Work, field::Layout, kernel::TileKernel};
 
 /// Side of a tile, pixels.
 const TILE_SIZE: u32 = 32;
 
+/// Rows of a band of a part, and of the pieces that threads share.
+const PART_ROWS: u32 = 32;
+const PIECE_ROWS: u32 = 8;
+
+/// Parts of a picture, at most.
+const MOST_PARTS: usize = 16;
+
+/// The bands of rows of each part of a picture that is so many rows high.
+#[must_use]
+pub fn parts(height: u32) -> Vec<Vec<Range<u32>>> {
+    let bands = height.div_ceil(PART_ROWS);
+    let bits = u32::BITS - bands.saturating_sub(1).leading_zeros();
+    let mut order: Vec<u32> = (0..bands).collect();
+    order.sort_by_key(|band| band.reverse_bits() >> (u32::BITS - bits.max(1)));
+    let count = MOST_PARTS.min(order.len());
+    let part = |part: usize| {
+        let own = order[part * order.len() / count..(part + 1) * order.len() / count].iter();
+        own.map(|band| band * PART_ROWS..((band + 1) * PART_ROWS).min(height))
+            .collect()
+    };
+    (0..count).map(part).collect()
+}
+
+/// Rows of a picture that are still to be cast.
+pub(crate) struct Band<'p> {
+    rows: Range<u32>,
+    colours: &'p mut [[f32; 3]],
+    opacities: &'p mut [f32],
+    ends: &'p mut [f32],
+    /// Empty if nobody asked.
+    ray_work: &'p mut [RayWork],
+}
+
+/// A picture in bands of so many rows.
+fn bands(picture: &mut Picture, rows: u32) -> Vec<Band<'_>> {
+    let (width, height) = (picture.image.width(), picture.image.height());
+    let pixels = rows as usize * width as usize;
+    let mut ray_work = picture.ray_work.chunks_mut(pixels);
+    let colours = picture.image.pixels_mut().chunks_mut(pixels);
+    let opacities = picture.opacity.chunks_mut(pixels);
+    let ends = picture.end.chunks_mut(pixels);
+    let bands = (0_u32..).zip(colours.zip(opacities).zip(ends));
+    bands
+        .map(|(band, ((colours, opacities), ends))| Band {
+            rows: band * rows..((band + 1) * rows).min(height),
+            colours,
+            opacities,
+            ends,
+            ray_work: ray_work.next().unwrap_or_default(),
+        })
+        .collect()
+}
+
+/// The bands of each part of a picture.
+pub(crate) fn bands_of_parts(picture: &mut Picture) -> Vec<Vec<Band<'_>>> {
+    let parts = parts(picture.image.height());
+    let mut of_parts: Vec<Vec<Band<'_>>> = parts.iter().map(|_| Vec::new()).collect();
+    for band in bands(picture, PIECE_ROWS) {
+        let own = |part: &Vec<Range<u32>>| part.iter().any(|rows| rows.contains(&band.rows.start));
+        if let Some(part) = parts.iter().position(own) {
+            of_parts[part].push(band);
+        }
+    }
+    of_parts
+}
+
 /// Casts all rays of a picture by lanes.
 pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
-    let (width, height) = (picture.image.width(), picture.image.height());
+    let width = picture.image.width();
+    picture.work = cast_bands(frame, width, bands(picture, TILE_SIZE), isa);
+}
+
+/// Casts the rays of bands of a picture that is so wide.
+pub(crate) fn cast_bands(frame: &Frame<'_>, width: u32, bands: Vec<Band<'_>>, isa: Isa) -> Work {
     let total = Mutex::new(Work::default());
-    let band = TILE_SIZE as usize * width as usize;
-    let colours = picture.image.pixels_mut().par_chunks_mut(band);
-    let opacities = picture.opacity.par_chunks_mut(band);
-    let ends = picture.end.par_chunks_mut(band);
-    // One chunk for each band, empty if nobody asked.
-    let mut ray_work = Vec::from_iter(picture.ray_work.chunks_mut(band));
-    ray_work.resize_with(height.div_ceil(TILE_SIZE) as usize, Default::default);
-    let bands = colours.zip(opacities).zip(ends).zip(ray_work).enumerate();
-    bands.for_each(|(band, (((colours, opacities), ends), ray_work))| {
-        let top = band as u32 * TILE_SIZE;
-        let rows = top..(top + TILE_SIZE).min(height);
+    bands.into_par_iter().for_each(|band| {
+        let rows = band.rows;
         let mut work = Work::default();
         let mut tile = Vec::new();
         for left in (0..width).step_by(TILE_SIZE as usize) {
@@ -45,10 +110,10 @@ pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
                 let start = row * width as usize + columns.start as usize;
                 for (pixel, result) in (start..).zip(own) {
                     let (colour, opacity) = frame.finish(result);
-                    colours[pixel] = colour;
-                    opacities[pixel] = opacity;
-                    ends[pixel] = result.end;
-                    if let Some(work) = ray_work.get_mut(pixel) {
+                    band.colours[pixel] = colour;
+                    band.opacities[pixel] = opacity;
+                    band.ends[pixel] = result.end;
+                    if let Some(work) = band.ray_work.get_mut(pixel) {
                         *work = result.work;
                     }
                 }
@@ -56,7 +121,7 @@ pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
         }
         total.lock().unwrap_or_else(|e| e.into_inner()).add(&work);
     });
-    picture.work = total.into_inner().unwrap_or_else(|e| e.into_inner());
+    total.into_inner().unwrap_or_else(|e| e.into_inner())
 }
 
 fn cast_tile(

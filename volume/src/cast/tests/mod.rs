@@ -417,3 +417,68 @@ fn a_clip_box_takes_samples_away_and_moves_none() {
         .unwrap_err();
     assert!(matches!(error, CastError::Clip { .. }));
 }
+
+#[test]
+fn parts_have_every_row_once_and_are_spread() {
+    for height in [1, 31, 32, 33, 480, 512, 1000, 1024, 5000] {
+        let parts = parts(height);
+        let mut rows: Vec<u32> = parts.iter().flatten().cloned().flatten().collect();
+        rows.sort_unstable();
+        assert!(rows.into_iter().eq(0..height));
+        assert!(parts.len() <= 16 && parts.iter().all(|part| !part.is_empty()));
+    }
+    let first: Vec<u32> = parts(1024)[..4]
+        .iter()
+        .flatten()
+        .map(|rows| rows.start / 256)
+        .collect();
+    assert!((0..4).all(|quarter| first.contains(&quarter)), "{first:?}");
+}
+
+#[test]
+fn a_picture_in_parts_has_the_rows_of_whole_ones() {
+    let volume = &volumes([20, 17, 31], [1.0, 1.5, 0.7], 3)[0];
+    let caster = Raycaster::new(volume).unwrap();
+    let extent = volume.extent();
+    let eye = extent * 0.5 + Vec3::new(40.0, -20.0, 20.0);
+    let camera = Camera::new(eye, extent * 0.5, Vec3::Z, 40.0).unwrap();
+    let (size, options) = ([37, 150], CastOptions::default());
+    for appearance in appearances_with_plain(volume) {
+        let prepared = caster.prepare_appearance(appearance).unwrap();
+        let whole = |step: f32| {
+            let options = CastOptions { step, ..options };
+            prepared.render(camera, size, &options).unwrap()
+        };
+        let same = prepared
+            .render_in_parts(camera, size, &options, |_, _| 1.0)
+            .unwrap();
+        let mut once = whole(1.0);
+        // Lanes are filled from other tiles.
+        once.work.packet_steps = same.work.packet_steps;
+        assert_eq!(
+            (same.image, same.opacity, same.end),
+            (once.image, once.opacity, once.end)
+        );
+        let steps = [1.0, 0.5, 2.0, 0.7, 1.3];
+        let mut told = Vec::new();
+        let mixed = prepared.render_in_parts(camera, size, &options, |part, work| {
+            told.push(work.samples);
+            steps[part]
+        });
+        let mixed = mixed.unwrap();
+        told.push(mixed.work.samples);
+        assert!(told[0] == 0 && told.is_sorted() && told.len() == 6);
+        for (part, step) in parts(size[1]).iter().zip(steps) {
+            let whole = whole(step);
+            for y in part.iter().cloned().flatten() {
+                for x in 0..size[0] {
+                    assert_eq!(
+                        mixed.image.get(x, y),
+                        whole.image.get(x, y),
+                        "{x} {y} {step}"
+                    );
+                }
+            }
+        }
+    }
+}
