@@ -17,6 +17,7 @@
 //! | [`estimate`] | how long rays will be, before they are cast |
 //! | [`predict`] | what a frame will take, before it is drawn |
 //! | [`steer`] | in which quality a frame takes a given time |
+//! | [`frames`] | frame after frame, each in its time |
 //! | [`sequence`] | what is to be seen at each moment of a recording |
 #![forbid(unsafe_code)]
 
@@ -26,6 +27,7 @@ pub mod cast;
 mod distance;
 pub mod enclosure;
 pub mod estimate;
+pub mod frames;
 pub mod generate;
 pub mod grid;
 pub mod load;
@@ -50,6 +52,7 @@ pub use crate::{
     },
     enclosure::{EnclosureError, EnclosureKind, EnclosureParams},
     estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
+    frames::{Control, Drawn, FrameClock, FrameLoop, FrameLoopParams, WorkTimer},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},

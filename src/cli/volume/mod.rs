@@ -1,6 +1,7 @@
 //! `raywright volume`: subcommands about volumes, one file each, and what they share.
 
 mod aim;
+mod evaluate;
 mod info;
 mod look;
 mod maps;
@@ -22,6 +23,8 @@ pub(crate) enum VolumeCommand {
     Render(Box<render::RenderArgs>),
     /// Measure what step, termination, interpolation and resolution cost and give, and recommend a setting
     Tradeoff(Box<tradeoff::TradeoffArgs>),
+    /// Compare ways to hold a frame time over scripted sequences
+    Evaluate(Box<evaluate::EvaluateArgs>),
 }
 
 /// Runs a subcommand.
@@ -30,5 +33,6 @@ pub(crate) fn run(command: &VolumeCommand) -> Result<(), Failure> {
         VolumeCommand::Info(args) => info::run(args),
         VolumeCommand::Render(args) => render::run(args),
         VolumeCommand::Tradeoff(args) => tradeoff::run(args),
+        VolumeCommand::Evaluate(args) => evaluate::run(args),
     }
 }

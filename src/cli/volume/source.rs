@@ -60,6 +60,21 @@ pub(crate) struct VolumeStage {
 }
 
 impl VolumeOptions {
+    /// A volume by its name alone.
+    pub(crate) fn named(volume: &str) -> Self {
+        Self {
+            volume: volume.to_owned(),
+            dims: None,
+            voxel_type: None,
+            endian: None,
+            spacing: None,
+            byte_skip: None,
+            fill: None,
+            data_anywhere: false,
+            seed: 1,
+        }
+    }
+
     /// The name of the volume without folder and endings.
     pub(crate) fn stem(&self) -> String {
         stem(&self.volume)

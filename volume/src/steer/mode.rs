@@ -331,6 +331,13 @@ impl Steering {
         pass
     }
 
+    /// Tells that the pass was drawn in another quality than it was to be, before its time is told.
+    pub fn drew(&mut self, quality: Quality) {
+        if let Phase::First(pass) | Phase::Second { pass, .. } = &mut self.phase {
+            pass.quality = quality;
+        }
+    }
+
     /// Tells the time of the pass that was to be drawn, seconds.
     ///
     /// # Errors

@@ -1,0 +1,347 @@
+//! `raywright volume evaluate`: how well frame times are predicted and steered, in several ways.
+
+use std::{collections::BTreeMap, fmt::Write, fs, path::PathBuf};
+
+use clap::{Args, ValueEnum};
+use comfy_table::{CellAlignment, Table, presets};
+use raywright::{
+    imaging::Camera,
+    study::steering::{Caster, Clock, Run, Stage, Summary, Way, run as lead, suitable_target},
+    volume::{
+        Estimator, Raycaster, View, Volume, presets as looks,
+        sequence::script::{Start, Views, thirty_seconds},
+    },
+};
+
+use super::source::{VolumeOptions, VolumeStage};
+use crate::cli::{
+    Failure, output,
+    run_options::{RunOptions, cancel_on_interrupt},
+};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ClockName {
+    /// Counted work times fixed costs: repeatable to the last bit
+    Work,
+    /// Time itself
+    Wall,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Volumes: files with a view file beside them that has sparse, dense, overview and close, or generated ones
+    #[arg(required = true)]
+    volumes: Vec<String>,
+    /// What tells the time
+    #[arg(long, value_enum, default_value_t = ClockName::Work)]
+    clock: ClockName,
+    /// Standard deviation of the noise of the work clock, as a share
+    #[arg(long, default_value_t = 0.02)]
+    noise: f64,
+    /// Seeds of sequences and noise
+    #[arg(long, value_delimiter = ',', default_value = "101,102,103")]
+    seeds: Vec<u64>,
+    /// Moments of the sequence per second
+    #[arg(long, default_value_t = 10.0)]
+    fps: f64,
+    /// Seconds that a frame may take; by default so many that three of four frames with a step of 0.75 are faster
+    #[arg(long, value_name = "SECONDS")]
+    target: Option<f64>,
+    /// Side of pictures in pixels
+    #[arg(long, default_value_t = 256)]
+    side: u32,
+    /// Folder for evaluation.csv, which has every frame
+    #[arg(short, long, default_value = ".")]
+    output: PathBuf,
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+/// All runs of a volume.
+struct OfVolume {
+    name: String,
+    runs: Vec<(Caster, String, Run)>,
+}
+
+/// Runs all sequences in all ways and prints the table, the goals and where they were missed.
+pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
+    let cancel = cancel_on_interrupt()?;
+    args.run.install(|| {
+        let folder = output::folder(&args.output)?;
+        let sequences = args.volumes.len() * args.seeds.len() * 4;
+        let bar = output::bar(sequences, "sequences");
+        let mut all = Vec::new();
+        for name in &args.volumes {
+            let options = VolumeOptions::named(name);
+            let stage = options.prepare()?;
+            let views = views(&options, &stage)?;
+            let volume = &stage.volume;
+            let caster = Raycaster::new(volume)?;
+            let estimator = Estimator::new(volume);
+            let mut of_volume = OfVolume {
+                name: options.stem(),
+                runs: Vec::new(),
+            };
+            for (caster_name, &seed) in Caster::ALL
+                .into_iter()
+                .flat_map(|c| args.seeds.iter().map(move |s| (c, s)))
+            {
+                let stage = Stage {
+                    volume,
+                    caster: &caster,
+                    estimator: &estimator,
+                    way_to_skip: caster_name,
+                    size: [args.side; 2],
+                };
+                for (start, start_name) in [(Start::Sparse, "sparse"), (Start::Dense, "dense")] {
+                    if cancel.is_cancelled() {
+                        return Err(Failure::Interrupted);
+                    }
+                    let mut sequence = thirty_seconds(name, volume, &views, start, seed);
+                    sequence.fps = args.fps;
+                    let clock = match args.clock {
+                        ClockName::Work => Clock::Work {
+                            noise: args.noise,
+                            seed,
+                        },
+                        ClockName::Wall => Clock::Wall,
+                    };
+                    let target = match args.target {
+                        Some(target) => target,
+                        None => suitable_target(&stage, &sequence, clock)?,
+                    };
+                    for run in lead(&stage, &sequence, ways(caster_name), target, clock)? {
+                        let name = format!("{start_name} {seed}");
+                        of_volume.runs.push((caster_name, name, run));
+                    }
+                    bar.inc(1);
+                }
+            }
+            all.push(of_volume);
+        }
+        bar.finish_and_clear();
+        fs::write(folder.join("evaluation.csv"), csv(&all))?;
+        print_table(&all)?;
+        print_goals(args.clock, &all)?;
+        output::line(folder.join("evaluation.csv").display())
+    })
+}
+
+/// The ways that are compared with a caster: those of the paper with its own, and all with ours.
+fn ways(caster: Caster) -> &'static [Way] {
+    match caster {
+        Caster::Hull => &[Way::NoAdapt, Way::LastFrame, Way::Paper, Way::TwoPass],
+        _ => &Way::ALL,
+    }
+}
+
+/// Two transfer functions and two cameras.
+fn views(options: &VolumeOptions, stage: &VolumeStage) -> Result<Views, Failure> {
+    if let Some(view) = &stage.view {
+        return own_views(view, &stage.volume);
+    }
+    let path = View::path_for(options.volume.as_ref());
+    Views::of(&View::read(&path)?).ok_or_else(|| {
+        Failure::with_hint(
+            anyhow::anyhow!("{} has too few views", path.display()),
+            "it needs transfer functions sparse and dense, and cameras overview and close",
+        )
+    })
+}
+
+/// Of a generated volume.
+fn own_views(view: &View, volume: &Volume) -> Result<Views, Failure> {
+    let [low, high] = volume.range();
+    let at = |share: f32| low + (high - low) * share;
+    let parts = (
+        view.transfer_functions.get("own"),
+        view.cameras.get("overview"),
+        looks::preset("fire", [at(0.55), at(0.8)]),
+    );
+    let (Some(dense), Some(overview), Some(sparse)) = parts else {
+        return Err(anyhow::anyhow!("a generated volume without a view").into());
+    };
+    Ok(Views {
+        sparse,
+        dense: dense.clone(),
+        overview: *overview,
+        close: Camera {
+            origin: overview.target + (overview.origin - overview.target) * 0.3,
+            ..*overview
+        },
+    })
+}
+
+fn summary<'a>(volumes: impl Iterator<Item = &'a OfVolume>, caster: Caster, way: Way) -> Summary {
+    let runs = volumes.flat_map(|volume| &volume.runs);
+    let own = runs.filter(|(by, _, run)| *by == caster && run.way == way);
+    Summary::of(own.map(|(_, _, run)| run))
+}
+
+const COLUMNS: [&str; 18] = [
+    "volume",
+    "caster",
+    "way",
+    "step",
+    "geo. step",
+    "÷ last",
+    "RMSE up",
+    "low",
+    "all",
+    "worst",
+    "fastest",
+    "slow",
+    "> 1.1",
+    "lags",
+    "p95",
+    "prediction",
+    "samples",
+    "cost",
+];
+
+fn print_table(all: &[OfVolume]) -> Result<(), Failure> {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(COLUMNS);
+    let mut rows = |name: &str, volumes: &[&OfVolume]| {
+        for (caster, way) in Caster::ALL
+            .into_iter()
+            .flat_map(|c| ways(c).iter().map(move |&w| (c, w)))
+        {
+            let last = summary(volumes.iter().copied(), caster, Way::LastFrame).mean_step;
+            let s = summary(volumes.iter().copied(), caster, way);
+            let percent = |share: f64| format!("{:.1}", 100.0 * share);
+            table.add_row([
+                name.to_owned(),
+                caster.name().to_owned(),
+                way.name().to_owned(),
+                format!("{:.3}", s.mean_step),
+                format!("{:.3}", s.geometric_step),
+                format!("{:.2}", s.mean_step / last),
+                percent(s.rmse_up),
+                percent(s.rmse_low),
+                percent(s.rmse),
+                format!("{:+.1}", 100.0 * s.error_up),
+                format!("{:+.1}", 100.0 * s.error_low),
+                percent(s.slow),
+                format!("{:.2}", 100.0 * s.above_tenth),
+                s.lags.to_string(),
+                format!("{:.3}", s.percentiles[1]),
+                percent(s.prediction),
+                percent(s.samples),
+                percent(s.cost),
+            ]);
+        }
+    };
+    for volume in all {
+        rows(&volume.name, &[volume]);
+    }
+    if all.len() > 1 {
+        rows("all", &all.iter().collect::<Vec<_>>());
+    }
+    for column in table.column_iter_mut().skip(3) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    output::line(format_args!(
+        "Errors in percent of the target; step in lengths of a voxel.\n{table}\n"
+    ))
+}
+
+/// Prints by how much goals were missed, and how many were met.
+fn print_goals(clock: ClockName, all: &[OfVolume]) -> Result<(), Failure> {
+    let (mut met, mut goals) = (0, 0);
+    let mut goal = |what: &str, limit: f64, value_of: &dyn Fn(&OfVolume) -> f64| {
+        let values: BTreeMap<&str, f64> =
+            all.iter().map(|v| (v.name.as_str(), value_of(v))).collect();
+        let missed: Vec<String> = values
+            .iter()
+            .filter(|(_, value)| !(**value <= limit))
+            .map(|(name, value)| format!("{name} {value:.3}"))
+            .collect();
+        goals += 1;
+        if missed.is_empty() {
+            met += 1;
+            return Ok(());
+        }
+        output::line(format_args!(
+            "missed: {what} at most {limit}: {}",
+            missed.join(", ")
+        ))
+    };
+    let by = |caster: Caster| {
+        move |volume: &OfVolume, way: Way| summary([volume].into_iter(), caster, way)
+    };
+    let (of, of_hull) = (by(Caster::Map), by(Caster::Hull));
+    match clock {
+        ClockName::Work => {
+            goal("paper, RMSE above the target", 0.13, &|v| {
+                of_hull(v, Way::Paper).rmse_up
+            })?;
+            goal("paper, largest overshoot", 0.62, &|v| {
+                of_hull(v, Way::Paper).error_up
+            })?;
+            goal("in parts, RMSE above the target", 0.03, &|v| {
+                of(v, Way::Parts).rmse_up
+            })?;
+            goal("in parts, largest overshoot", 0.15, &|v| {
+                of(v, Way::Parts).error_up
+            })?;
+            goal("in parts, frames above 1.1", 0.005, &|v| {
+                of(v, Way::Parts).above_tenth
+            })?;
+            goal("in parts, step ÷ last frame's", 1.03, &|v| {
+                of(v, Way::Parts).mean_step / of(v, Way::LastFrame).mean_step
+            })?;
+            goal("in parts, step ÷ two pass's", 1.0 / 1.5, &|v| {
+                of(v, Way::Parts).mean_step / of(v, Way::TwoPass).mean_step
+            })?;
+            goal("ours, prediction", 0.07, &|v| of(v, Way::Ours).prediction)?;
+            goal("RMSE above the target, paper ÷ last frame", 1.0, &|v| {
+                of_hull(v, Way::Paper).rmse_up / of_hull(v, Way::LastFrame).rmse_up
+            })?;
+        }
+        ClockName::Wall => {
+            goal("in parts, 95th percentile", 1.05, &|v| {
+                of(v, Way::Parts).percentiles[1]
+            })?;
+            goal("in parts, largest overshoot", 0.2, &|v| {
+                of(v, Way::Parts).error_up
+            })?;
+            goal("in parts, overhead", 0.02, &|v| of(v, Way::Parts).overhead)?;
+        }
+    }
+    output::line(format_args!("goals: {met} of {goals} met"))
+}
+
+/// Every frame of every run.
+fn csv(all: &[OfVolume]) -> String {
+    let mut text = String::from(
+        "volume,caster,sequence,way,time_s,target_s,frame_s,cast_s,overhead_s,predicted_s,step,step_spread,samples,estimated_samples,cost_ratio,is_switch\n",
+    );
+    for volume in all {
+        for (caster, sequence, run) in &volume.runs {
+            for f in &run.frames {
+                let _ = writeln!(
+                    text,
+                    "{},{},{sequence},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                    volume.name,
+                    caster.name(),
+                    run.way.name().replace(',', ""),
+                    f.time,
+                    run.target,
+                    f.frame_time,
+                    f.cast_time,
+                    f.overhead,
+                    f.predicted,
+                    f.step,
+                    f.step_spread,
+                    f.samples,
+                    f.estimated,
+                    f.cost_ratio,
+                    f.is_switch,
+                );
+            }
+        }
+    }
+    text
+}

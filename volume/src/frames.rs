@@ -1,0 +1,353 @@
+//! The loop of a frame: prepare, estimate, predict, choose a step, cast, measure, learn.
+//!
+//! Algorithm 1 of Bruder, Frey, Ertl, 2016, with control between the parts of a picture besides.
+//!
+//! Invariants: what a transfer function needs is prepared once for as long as it is the same; with a
+//! clock that depends on work alone, frames are a function of what was asked for, in order.
+
+use raywright_bvh::BuildWorkspace;
+
+use crate::{
+    cast::{CastError, CastOptions, Picture, Prepared, Raycaster, Work, parts},
+    enclosure::{EnclosureError, EnclosureParams},
+    estimate::{EstimateMethod, Estimator, PreparedEstimate},
+    grid::Volume,
+    predict::{FramePredictor, Outlook, PredictError, Prediction, PredictorParams, Quality},
+    sequence::Moment,
+    steer::{
+        Inside, InsideParams, Next, PartShare, Steering, SteeringError, SteeringParams, StepLimits,
+        WorkClock, part_shares,
+    },
+    transfer::TransferFunction,
+};
+
+/// The least that is left of a target for casting, as a share.
+const LEAST_SHARE: f64 = 0.05;
+
+/// Something that measures how long a frame takes.
+pub trait FrameClock {
+    /// A span of frame `frame` begins.
+    fn start(&mut self, frame: u64);
+
+    /// Seconds since then, in which this work was done.
+    fn elapsed(&self, work: &Work) -> f64;
+}
+
+/// A [`WorkClock`] at work: preparing takes no time.
+#[derive(Clone, Debug, Default)]
+pub struct WorkTimer {
+    clock: WorkClock,
+    frame: u64,
+}
+
+impl WorkTimer {
+    /// A timer that begins with frame 0.
+    #[must_use]
+    pub fn new(clock: WorkClock) -> Self {
+        Self { clock, frame: 0 }
+    }
+}
+
+impl FrameClock for WorkTimer {
+    fn start(&mut self, frame: u64) {
+        self.frame = frame;
+    }
+
+    fn elapsed(&self, work: &Work) -> f64 {
+        if *work == Work::default() {
+            0.0
+        } else {
+            self.clock.time(work, self.frame)
+        }
+    }
+}
+
+/// Whether the step may change on the way through a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// One step for a frame.
+    Whole,
+    /// Each part of the picture has a step of its own if need be.
+    Parts,
+}
+
+/// Everything that a loop is made with.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct FrameLoopParams {
+    /// How steps are chosen, and the target.
+    pub steering: SteeringParams,
+    /// How frames are predicted.
+    pub predictor: PredictorParams,
+    /// How the end of rays is estimated.
+    pub method: EstimateMethod,
+    /// Whether steps change within a frame.
+    pub control: Control,
+    /// Width and height of pictures, pixels.
+    pub size: [u32; 2],
+    /// Everything of pictures but their step and clip box.
+    pub options: CastOptions,
+    /// The tree around what can be seen, if the options skip by one.
+    pub enclosure: Option<EnclosureParams>,
+}
+
+impl FrameLoopParams {
+    /// Pictures of a size, steered in some way, with the default predictor.
+    #[must_use]
+    pub fn new(steering: SteeringParams, size: [u32; 2]) -> Self {
+        Self {
+            steering,
+            predictor: PredictorParams::plus(),
+            method: EstimateMethod::MeanExtinction,
+            control: Control::Whole,
+            size,
+            options: CastOptions::default(),
+            enclosure: None,
+        }
+    }
+}
+
+/// Why there is no frame.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// No picture.
+    #[error(transparent)]
+    Cast(#[from] CastError),
+    /// No tree around what can be seen.
+    #[error(transparent)]
+    Enclosure(#[from] EnclosureError),
+    /// No prediction.
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+    /// No step.
+    #[error(transparent)]
+    Steering(#[from] SteeringError),
+}
+
+/// A frame that was drawn.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Drawn {
+    /// What is shown.
+    pub picture: Picture,
+    /// Its quality; of parts with different steps, that of as many samples.
+    pub quality: Quality,
+    /// The steps of its parts, in their order; one if there are no parts.
+    pub steps: Vec<f64>,
+    /// Seconds of everything.
+    pub frame_time: f64,
+    /// Seconds of what is shown alone.
+    pub cast_time: f64,
+    /// Seconds before the first ray: preparing, estimating, predicting, choosing.
+    pub overhead: f64,
+    /// What was predicted for what is shown, at the quality that it got in the end.
+    pub prediction: Prediction,
+    /// Samples that were estimated, before anything learned.
+    pub estimated_samples: f64,
+    /// As of the [`Pass`](crate::steer::Pass): whether the step was a safe one.
+    pub safe: bool,
+    /// As of the [`Pass`](crate::steer::Pass): whether no quality was expected to hold the target.
+    pub over_budget: bool,
+}
+
+/// Draws frame after frame of a volume, each in its time.
+#[derive(Debug)]
+pub struct FrameLoop<'a> {
+    volume: &'a Volume,
+    caster: &'a Raycaster<'a>,
+    estimator: &'a Estimator<'a>,
+    params: FrameLoopParams,
+    steering: Steering,
+    predictor: FramePredictor,
+    shown: Option<Shown<'a>>,
+    workspace: BuildWorkspace,
+    frame: u64,
+}
+
+/// What was prepared for a transfer function.
+#[derive(Debug)]
+struct Shown<'a> {
+    function: TransferFunction,
+    prepared: Prepared<'a>,
+    estimate: PreparedEstimate<'a>,
+}
+
+impl<'a> FrameLoop<'a> {
+    /// A loop that has drawn no frame; the steps allowed are those of its parameters and of the volume.
+    ///
+    /// # Errors
+    /// [`FrameError::Steering`] and [`FrameError::Predict`] if a parameter has no meaning.
+    pub fn new(
+        volume: &'a Volume,
+        caster: &'a Raycaster<'a>,
+        estimator: &'a Estimator<'a>,
+        params: FrameLoopParams,
+    ) -> Result<Self, FrameError> {
+        Ok(Self {
+            volume,
+            caster,
+            estimator,
+            steering: Steering::new(params.steering.for_volume(volume))?,
+            predictor: FramePredictor::new(params.predictor)?,
+            params,
+            shown: None,
+            workspace: BuildWorkspace::default(),
+            frame: 0,
+        })
+    }
+
+    /// What it has learned.
+    #[must_use]
+    pub fn predictor(&self) -> &FramePredictor {
+        &self.predictor
+    }
+
+    /// Draws what is to be seen at a moment.
+    ///
+    /// # Errors
+    /// [`FrameError`].
+    pub fn draw(
+        &mut self,
+        moment: &Moment,
+        clock: &mut impl FrameClock,
+    ) -> Result<Drawn, FrameError> {
+        let frame = self.frame;
+        self.frame += 1;
+        clock.start(frame);
+        let target = self.params.steering.target;
+        let mut options = self.params.options;
+        options.clip = moment.clip;
+        options.step = 1.0;
+        let size = self.params.size;
+        let kept = self
+            .shown
+            .take()
+            .filter(|shown| shown.function == moment.function);
+        let shown = match kept {
+            Some(shown) => shown,
+            None => {
+                let Self {
+                    caster, estimator, ..
+                } = *self;
+                Shown::new(caster, estimator, &self.params, &mut self.workspace, moment)?
+            }
+        };
+        let shown = &*self.shown.insert(shown);
+        let estimate = shown
+            .estimate
+            .estimate(moment.camera, size, &options, frame as u32)?;
+        let outlook = Outlook::new(&estimate, self.volume, &moment.camera, size, options.step);
+        let nothing = Work::default();
+        let left = (target - clock.elapsed(&nothing)).max(LEAST_SHARE * target);
+        self.steering.set_target(left)?;
+        let mut pass = self.steering.begin(&self.predictor.frame(&outlook));
+        let overhead = clock.elapsed(&nothing);
+        let mut spent = 0.0;
+        loop {
+            options.step = pass.quality.step as f32;
+            clock.start(frame);
+            let (picture, steps, quality) = match self.params.control {
+                Control::Whole => {
+                    let picture = shown.prepared.render(moment.camera, size, &options)?;
+                    (picture, vec![pass.quality.step], pass.quality)
+                }
+                Control::Parts => {
+                    let rows = parts(size[1]);
+                    let shares = part_shares(&estimate, size[1], &rows);
+                    let limits = self.steering.params().limits;
+                    let (predictor, left) = (&self.predictor, left - spent);
+                    let inside = inside(predictor, &outlook, pass.quality, left, limits, shares)?;
+                    in_parts(&shown.prepared, moment, size, &options, inside, clock)?
+                }
+            };
+            let time = clock.elapsed(&picture.work);
+            let prediction = self.predictor.predict(&outlook, quality)?;
+            let estimated_samples = outlook.samples(quality);
+            self.predictor
+                .learn(&outlook, quality, &picture.work, time)?;
+            self.steering.drew(quality);
+            match self.steering.finish(time)? {
+                Next::DrawAgain(again) => {
+                    pass = again;
+                    spent += time;
+                }
+                Next::Shown { frame_time, .. } => {
+                    return Ok(Drawn {
+                        picture,
+                        quality,
+                        steps,
+                        frame_time: overhead + frame_time,
+                        cast_time: time,
+                        overhead,
+                        prediction,
+                        estimated_samples,
+                        safe: pass.safe,
+                        over_budget: pass.over_budget,
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// Control of a pass that may take `target` seconds.
+fn inside(
+    predictor: &FramePredictor,
+    outlook: &Outlook,
+    quality: Quality,
+    target: f64,
+    limits: StepLimits,
+    shares: Vec<PartShare>,
+) -> Result<Inside, FrameError> {
+    let prediction = predictor.predict(outlook, quality)?;
+    let costs = predictor.additive().costs();
+    let all = costs.time(&prediction.counts);
+    let samples = costs.sample * prediction.counts.samples + costs.lit * prediction.counts.lit;
+    let share = if all > 0.0 { samples / all } else { 1.0 };
+    Ok(Inside::new(InsideParams::new(
+        target,
+        prediction.time,
+        share,
+        quality.step,
+        limits,
+        shares,
+    )))
+}
+
+impl<'a> Shown<'a> {
+    /// What the transfer function of a moment needs.
+    fn new(
+        caster: &'a Raycaster<'a>,
+        estimator: &'a Estimator<'a>,
+        params: &FrameLoopParams,
+        workspace: &mut BuildWorkspace,
+        moment: &Moment,
+    ) -> Result<Self, FrameError> {
+        let mut prepared = caster.prepare(&moment.function);
+        if let Some(enclosure) = &params.enclosure {
+            prepared.enclose(enclosure, workspace)?;
+        }
+        Ok(Self {
+            function: moment.function.clone(),
+            prepared,
+            estimate: estimator.prepare(&moment.function, params.method),
+        })
+    }
+}
+
+/// A picture with control between its parts, their steps, and the quality of the whole.
+fn in_parts(
+    prepared: &Prepared<'_>,
+    moment: &Moment,
+    size: [u32; 2],
+    options: &CastOptions,
+    mut inside: Inside,
+    clock: &impl FrameClock,
+) -> Result<(Picture, Vec<f64>, Quality), FrameError> {
+    let picture = prepared.render_in_parts(moment.camera, size, options, |_, work| {
+        inside.next_step(clock.elapsed(work)) as f32
+    })?;
+    let quality = Quality::with_step(inside.mean_step());
+    Ok((picture, inside.steps().to_vec(), quality))
+}
