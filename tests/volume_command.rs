@@ -373,3 +373,32 @@ fn a_tradeoff_leaves_a_page_and_a_table() {
     assert!(table.lines().count() > 200);
     assert!(table.lines().all(|line| line.split(',').count() == columns));
 }
+
+#[test]
+fn an_evaluation_is_repeated_to_the_last_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let evaluate = || {
+        let args = "volume evaluate marschner-lobb --side 24 --fps 2 --seeds 1 --noise 0.05 -o out";
+        let output = raywright(folder.path(), &args.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let frames = fs::read_to_string(folder.path().join("out/evaluation.csv"));
+        (text(&output.stdout), frames.expect("a table"))
+    };
+    let (printed, frames) = evaluate();
+    for way in [
+        "no adapt",
+        "last frame",
+        "paper",
+        "ours",
+        "in parts",
+        "two pass",
+    ] {
+        assert!(printed.contains(way), "{printed}");
+    }
+    assert!(printed.contains("goals: "), "{printed}");
+    // 30 seconds, two starts, four and six ways.
+    assert_eq!(frames.lines().count(), 1 + 60 * 2 * 10);
+    assert_eq!(evaluate(), (printed, frames));
+    let output = raywright(folder.path(), &["volume", "evaluate", "missing.nrrd"]);
+    assert_eq!(output.status.code(), Some(2));
+}

@@ -95,12 +95,16 @@ impl Way {
             Self::TwoPass => Mode::TwoPass,
         };
         let is_ours = matches!(self, Self::Ours | Self::Parts);
-        let steering = if is_ours {
+        // What errs is put right within the frame: caution would only cost quality.
+        let steering = if self == Self::Ours {
             SteeringParams::cautious(mode, target)
         } else {
             SteeringParams::new(mode, target)
         };
         let mut params = FrameLoopParams::new(steering, size);
+        if self == Self::Parts {
+            params.steering.shrink_limit = 0.5;
+        }
         if !is_ours {
             params.predictor = PredictorParams::paper();
             params.method = EstimateMethod::CubeRoot;

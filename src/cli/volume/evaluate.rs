@@ -255,7 +255,7 @@ fn print_goals(clock: ClockName, all: &[OfVolume]) -> Result<(), Failure> {
             all.iter().map(|v| (v.name.as_str(), value_of(v))).collect();
         let missed: Vec<String> = values
             .iter()
-            .filter(|(_, value)| !(**value <= limit))
+            .filter(|(_, value)| value.is_nan() || **value > limit)
             .map(|(name, value)| format!("{name} {value:.3}"))
             .collect();
         goals += 1;

@@ -15,9 +15,11 @@ use super::{Frame, Picture, RayResult, RayWork, Work, field::Layout, kernel::Til
 /// Side of a tile, pixels.
 const TILE_SIZE: u32 = 32;
 
-/// Rows of a band of a part, and of the pieces that threads share.
-const PART_ROWS: u32 = 32;
+/// Rows of the pieces of a part that threads share; a band of a part has some of them.
 const PIECE_ROWS: u32 = 8;
+
+/// Bands of all parts together, at most.
+const MOST_BANDS: u32 = 32;
 
 /// Parts of a picture, at most.
 const MOST_PARTS: usize = 16;
@@ -25,14 +27,15 @@ const MOST_PARTS: usize = 16;
 /// The bands of rows of each part of a picture that is so many rows high.
 #[must_use]
 pub fn parts(height: u32) -> Vec<Vec<Range<u32>>> {
-    let bands = height.div_ceil(PART_ROWS);
+    let rows = height.div_ceil(MOST_BANDS).next_multiple_of(PIECE_ROWS);
+    let bands = height.div_ceil(rows.max(1));
     let bits = u32::BITS - bands.saturating_sub(1).leading_zeros();
     let mut order: Vec<u32> = (0..bands).collect();
     order.sort_by_key(|band| band.reverse_bits() >> (u32::BITS - bits.max(1)));
     let count = MOST_PARTS.min(order.len());
     let part = |part: usize| {
         let own = order[part * order.len() / count..(part + 1) * order.len() / count].iter();
-        own.map(|band| band * PART_ROWS..((band + 1) * PART_ROWS).min(height))
+        own.map(|band| band * rows..((band + 1) * rows).min(height))
             .collect()
     };
     (0..count).map(part).collect()
