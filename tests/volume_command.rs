@@ -402,3 +402,28 @@ fn an_evaluation_is_repeated_to_the_last_bit() {
     let output = raywright(folder.path(), &["volume", "evaluate", "missing.nrrd"]);
     assert_eq!(output.status.code(), Some(2));
 }
+
+#[test]
+fn a_sequence_is_recorded_played_and_played_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let play = |more: &str| {
+        let args = format!(
+            "volume play marschner-lobb --dims 20,20,20 --width 24 --height 24 --target-fps 4 --work-clock {more}"
+        );
+        let output = raywright(folder.path(), &args.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let first = play("--record own.json --save-every 40 -o out");
+    assert!(first.starts_with("120 frames, ours, in parts"), "{first}");
+    let page = fs::read_to_string(folder.path().join("out/marschner-lobb-timeline.html"));
+    assert!(page.expect("a page").contains("<svg"));
+    let frames = fs::read_dir(folder.path().join("out")).expect("a folder");
+    assert_eq!(frames.count(), 1 + 3);
+    assert_eq!(play("--sequence own.json -o out"), first);
+    let output = raywright(
+        folder.path(),
+        &["volume", "play", "marschner-lobb", "--target-fps", "0"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+}

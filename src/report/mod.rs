@@ -13,6 +13,7 @@ pub(crate) mod number;
 pub(crate) mod svg;
 
 mod page;
+pub mod timeline;
 pub mod tradeoff;
 
 pub use page::page;

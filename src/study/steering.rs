@@ -6,10 +6,12 @@
 
 use std::time::Instant;
 
+use crate::imaging::Image;
 use crate::volume::{
-    Control, EnclosureKind, EnclosureParams, EstimateMethod, Estimator, FrameClock, FrameLoop,
-    FrameLoopParams, Mode, PredictorParams, Raycaster, Sequence, Skipping, SteeringParams, Volume,
-    Work, WorkClock, WorkTimer, frames::FrameError, predict::WorkCosts, sequence::SequenceError,
+    Control, Drawn, EnclosureKind, EnclosureParams, EstimateMethod, Estimator, FrameClock,
+    FrameLoop, FrameLoopParams, Mode, PredictorParams, Raycaster, Sequence, Skipping,
+    SteeringParams, Volume, Work, WorkClock, WorkTimer, frames::FrameError, predict::WorkCosts,
+    sequence::SequenceError,
 };
 
 /// What parts of a frame cost by the work clock: not what predictors begin with.
@@ -198,6 +200,31 @@ pub struct FrameRow {
     pub is_switch: bool,
 }
 
+impl FrameRow {
+    fn new(drawn: &Drawn, time: f64, is_switch: bool) -> Self {
+        let predicted = drawn.prediction;
+        let spread = drawn
+            .steps
+            .iter()
+            .fold([f64::INFINITY, 0.0_f64], |[low, high], &s| {
+                [low.min(s), high.max(s)]
+            });
+        Self {
+            time,
+            step: drawn.quality.step,
+            step_spread: spread[1] / spread[0],
+            frame_time: drawn.frame_time,
+            cast_time: drawn.cast_time,
+            overhead: drawn.overhead,
+            predicted: predicted.time,
+            samples: drawn.picture.work.samples as f64,
+            estimated: drawn.estimated_samples,
+            cost_ratio: predicted.cost_per_sample * predicted.samples / drawn.cast_time,
+            is_switch,
+        }
+    }
+}
+
 /// A sequence in one way.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -266,31 +293,48 @@ pub fn run(
         last_key = Some(moment.function_key);
         for (frames, timer, run) in &mut loops {
             let drawn = frames.draw(&moment, timer)?;
-            let samples = drawn.picture.work.samples as f64;
-            let predicted = drawn.prediction;
-            let cost = drawn.cast_time / predicted.samples;
-            let spread = drawn
-                .steps
-                .iter()
-                .fold([f64::INFINITY, 0.0_f64], |[low, high], &s| {
-                    [low.min(s), high.max(s)]
-                });
-            run.frames.push(FrameRow {
-                time: moment.time,
-                step: drawn.quality.step,
-                step_spread: spread[1] / spread[0],
-                frame_time: drawn.frame_time,
-                cast_time: drawn.cast_time,
-                overhead: drawn.overhead,
-                predicted: predicted.time,
-                samples,
-                estimated: drawn.estimated_samples,
-                cost_ratio: predicted.cost_per_sample / cost,
-                is_switch,
-            });
+            run.frames
+                .push(FrameRow::new(&drawn, moment.time, is_switch));
         }
     }
     Ok(loops.into_iter().map(|(_, _, run)| run).collect())
+}
+
+/// Plays a sequence in one way: each frame shows the moment that has been reached when it begins, and is
+/// there for the target at least. `tell` hears of every frame and says whether to go on.
+///
+/// # Errors
+/// [`StudyError`].
+pub fn play(
+    stage: &Stage<'_>,
+    sequence: &Sequence,
+    way: Way,
+    target: f64,
+    clock: Clock,
+    mut tell: impl FnMut(&FrameRow, &Image) -> bool,
+) -> Result<Run, StudyError> {
+    let params = way.params(stage.way_to_skip, target, stage.size);
+    let mut frames = FrameLoop::new(stage.volume, stage.caster, stage.estimator, params)?;
+    let mut timer = Timer::new(clock);
+    let mut run = Run {
+        way,
+        target,
+        frames: Vec::new(),
+    };
+    let (mut time, mut last_key) = (0.0, None);
+    while time < sequence.duration_s {
+        let moment = sequence.at(time)?;
+        let is_switch = last_key.is_some_and(|key| key != moment.function_key);
+        last_key = Some(moment.function_key);
+        let drawn = frames.draw(&moment, &mut timer)?;
+        let row = FrameRow::new(&drawn, time, is_switch);
+        run.frames.push(row);
+        if !tell(&row, &drawn.picture.image) {
+            break;
+        }
+        time += row.frame_time.max(target);
+    }
+    Ok(run)
 }
 
 /// A target for a sequence: three of four frames with the fixed step are faster.

@@ -5,15 +5,15 @@ use std::{collections::BTreeMap, fmt::Write, fs, path::PathBuf};
 use clap::{Args, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use raywright::{
-    imaging::Camera,
+    report::timeline::{Timeline, TimelineHeader, timeline_page},
     study::steering::{Caster, Clock, Run, Stage, Summary, Way, run as lead, suitable_target},
     volume::{
-        Estimator, Raycaster, View, Volume, presets as looks,
-        sequence::script::{Start, Views, thirty_seconds},
+        Estimator, Raycaster,
+        sequence::script::{Start, thirty_seconds},
     },
 };
 
-use super::source::{VolumeOptions, VolumeStage};
+use super::{script::views, source::VolumeOptions};
 use crate::cli::{
     Failure, output,
     run_options::{RunOptions, cancel_on_interrupt},
@@ -50,7 +50,7 @@ pub(crate) struct EvaluateArgs {
     /// Side of pictures in pixels
     #[arg(long, default_value_t = 256)]
     side: u32,
-    /// Folder for evaluation.csv, which has every frame
+    /// Folder for evaluation.html and evaluation.csv, which has every frame
     #[arg(short, long, default_value = ".")]
     output: PathBuf,
     #[command(flatten)]
@@ -121,9 +121,20 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         }
         bar.finish_and_clear();
         fs::write(folder.join("evaluation.csv"), csv(&all))?;
-        print_table(&all)?;
-        print_goals(args.clock, &all)?;
-        output::line(folder.join("evaluation.csv").display())
+        let rows = rows(&all);
+        print_table(&rows)?;
+        let sentences = goals(args.clock, &all);
+        for sentence in &sentences {
+            output::line(sentence)?;
+        }
+        fs::write(
+            folder.join("evaluation.html"),
+            page(args, &all, rows, sentences),
+        )?;
+        for name in ["evaluation.html", "evaluation.csv"] {
+            output::line(folder.join(name).display())?;
+        }
+        Ok(())
     })
 }
 
@@ -135,48 +146,17 @@ fn ways(caster: Caster) -> &'static [Way] {
     }
 }
 
-/// Two transfer functions and two cameras.
-fn views(options: &VolumeOptions, stage: &VolumeStage) -> Result<Views, Failure> {
-    if let Some(view) = &stage.view {
-        return own_views(view, &stage.volume);
-    }
-    let path = View::path_for(options.volume.as_ref());
-    Views::of(&View::read(&path)?).ok_or_else(|| {
-        Failure::with_hint(
-            anyhow::anyhow!("{} has too few views", path.display()),
-            "it needs transfer functions sparse and dense, and cameras overview and close",
-        )
-    })
-}
-
-/// Of a generated volume.
-fn own_views(view: &View, volume: &Volume) -> Result<Views, Failure> {
-    let [low, high] = volume.range();
-    let at = |share: f32| low + (high - low) * share;
-    let parts = (
-        view.transfer_functions.get("own"),
-        view.cameras.get("overview"),
-        looks::preset("fire", [at(0.55), at(0.8)]),
-    );
-    let (Some(dense), Some(overview), Some(sparse)) = parts else {
-        return Err(anyhow::anyhow!("a generated volume without a view").into());
-    };
-    Ok(Views {
-        sparse,
-        dense: dense.clone(),
-        overview: *overview,
-        close: Camera {
-            origin: overview.target + (overview.origin - overview.target) * 0.3,
-            ..*overview
-        },
-    })
-}
-
 fn summary<'a>(volumes: impl Iterator<Item = &'a OfVolume>, caster: Caster, way: Way) -> Summary {
     let runs = volumes.flat_map(|volume| &volume.runs);
     let own = runs.filter(|(by, _, run)| *by == caster && run.way == way);
     Summary::of(own.map(|(_, _, run)| run))
 }
+
+/// Columns of the table that are names.
+const NAMES: usize = 3;
+
+/// What its figures are.
+const UNITS: &str = "Errors in percent of the target; step in lengths of a voxel.";
 
 const COLUMNS: [&str; 18] = [
     "volume",
@@ -199,11 +179,10 @@ const COLUMNS: [&str; 18] = [
     "cost",
 ];
 
-fn print_table(all: &[OfVolume]) -> Result<(), Failure> {
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING);
-    table.set_header(COLUMNS);
-    let mut rows = |name: &str, volumes: &[&OfVolume]| {
+/// The table, its head first.
+fn rows(all: &[OfVolume]) -> Vec<Vec<String>> {
+    let mut table = vec![COLUMNS.map(str::to_owned).to_vec()];
+    let mut add = |name: &str, volumes: &[&OfVolume]| {
         for (caster, way) in Caster::ALL
             .into_iter()
             .flat_map(|c| ways(c).iter().map(move |&w| (c, w)))
@@ -211,7 +190,7 @@ fn print_table(all: &[OfVolume]) -> Result<(), Failure> {
             let last = summary(volumes.iter().copied(), caster, Way::LastFrame).mean_step;
             let s = summary(volumes.iter().copied(), caster, way);
             let percent = |share: f64| format!("{:.1}", 100.0 * share);
-            table.add_row([
+            table.push(vec![
                 name.to_owned(),
                 caster.name().to_owned(),
                 way.name().to_owned(),
@@ -234,21 +213,28 @@ fn print_table(all: &[OfVolume]) -> Result<(), Failure> {
         }
     };
     for volume in all {
-        rows(&volume.name, &[volume]);
+        add(&volume.name, &[volume]);
     }
     if all.len() > 1 {
-        rows("all", &all.iter().collect::<Vec<_>>());
+        add("all", &all.iter().collect::<Vec<_>>());
     }
-    for column in table.column_iter_mut().skip(3) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    output::line(format_args!(
-        "Errors in percent of the target; step in lengths of a voxel.\n{table}\n"
-    ))
+    table
 }
 
-/// Prints by how much goals were missed, and how many were met.
-fn print_goals(clock: ClockName, all: &[OfVolume]) -> Result<(), Failure> {
+fn print_table(rows: &[Vec<String>]) -> Result<(), Failure> {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(rows[0].clone());
+    table.add_rows(rows[1..].iter().cloned());
+    for column in table.column_iter_mut().skip(NAMES) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    output::line(format_args!("{UNITS}\n{table}\n"))
+}
+
+/// By how much goals were missed, and how many were met.
+fn goals(clock: ClockName, all: &[OfVolume]) -> Vec<String> {
+    let mut sentences = Vec::new();
     let (mut met, mut goals) = (0, 0);
     let mut goal = |what: &str, limit: f64, value_of: &dyn Fn(&OfVolume) -> f64| {
         let values: BTreeMap<&str, f64> =
@@ -261,9 +247,9 @@ fn print_goals(clock: ClockName, all: &[OfVolume]) -> Result<(), Failure> {
         goals += 1;
         if missed.is_empty() {
             met += 1;
-            return Ok(());
+            return;
         }
-        output::line(format_args!(
+        sentences.push(format!(
             "missed: {what} at most {limit}: {}",
             missed.join(", ")
         ))
@@ -276,41 +262,84 @@ fn print_goals(clock: ClockName, all: &[OfVolume]) -> Result<(), Failure> {
         ClockName::Work => {
             goal("paper, RMSE above the target", 0.13, &|v| {
                 of_hull(v, Way::Paper).rmse_up
-            })?;
+            });
             goal("paper, largest overshoot", 0.62, &|v| {
                 of_hull(v, Way::Paper).error_up
-            })?;
+            });
             goal("in parts, RMSE above the target", 0.03, &|v| {
                 of(v, Way::Parts).rmse_up
-            })?;
+            });
             goal("in parts, largest overshoot", 0.15, &|v| {
                 of(v, Way::Parts).error_up
-            })?;
+            });
             goal("in parts, frames above 1.1", 0.005, &|v| {
                 of(v, Way::Parts).above_tenth
-            })?;
+            });
             goal("in parts, step ÷ last frame's", 1.03, &|v| {
                 of(v, Way::Parts).mean_step / of(v, Way::LastFrame).mean_step
-            })?;
+            });
             goal("in parts, step ÷ two pass's", 1.0 / 1.5, &|v| {
                 of(v, Way::Parts).mean_step / of(v, Way::TwoPass).mean_step
-            })?;
-            goal("ours, prediction", 0.07, &|v| of(v, Way::Ours).prediction)?;
+            });
+            goal("ours, prediction", 0.07, &|v| of(v, Way::Ours).prediction);
             goal("RMSE above the target, paper ÷ last frame", 1.0, &|v| {
                 of_hull(v, Way::Paper).rmse_up / of_hull(v, Way::LastFrame).rmse_up
-            })?;
+            });
         }
         ClockName::Wall => {
             goal("in parts, 95th percentile", 1.05, &|v| {
                 of(v, Way::Parts).percentiles[1]
-            })?;
+            });
             goal("in parts, largest overshoot", 0.2, &|v| {
                 of(v, Way::Parts).error_up
-            })?;
-            goal("in parts, overhead", 0.02, &|v| of(v, Way::Parts).overhead)?;
+            });
+            goal("in parts, overhead", 0.02, &|v| of(v, Way::Parts).overhead);
         }
     }
-    output::line(format_args!("goals: {met} of {goals} met"))
+    sentences.push(format!("goals: {met} of {goals} met"));
+    sentences
+}
+
+/// The page: the table, and the first sequence of every volume frame by frame.
+fn page(
+    args: &EvaluateArgs,
+    all: &[OfVolume],
+    table: Vec<Vec<String>>,
+    mut sentences: Vec<String>,
+) -> String {
+    let mut timelines = Vec::new();
+    for volume in all {
+        for caster in Caster::ALL {
+            let own = || volume.runs.iter().filter(|(by, _, _)| *by == caster);
+            if let Some((_, first, _)) = own().next() {
+                timelines.push(Timeline {
+                    title: format!("{}, {first}, {}", volume.name, caster.name()),
+                    runs: own()
+                        .filter(|(_, s, _)| s == first)
+                        .map(|(_, _, run)| run)
+                        .collect(),
+                });
+            }
+        }
+    }
+    sentences.insert(0, UNITS.into());
+    let setting = |name: &str, value: String| (name.to_owned(), value);
+    let header = TimelineHeader {
+        title: "Frame times, predicted and steered".into(),
+        sentences,
+        table,
+        names: NAMES,
+        settings: vec![
+            setting("clock", format!("{:?}", args.clock).to_lowercase()),
+            setting("noise of the work clock", args.noise.to_string()),
+            setting("seeds", format!("{:?}", args.seeds)),
+            setting("moments per second", args.fps.to_string()),
+            setting("picture", format!("{0} × {0} pixels", args.side)),
+            setting("instruction set", args.run.isa().name().to_owned()),
+            setting("threads", rayon::current_num_threads().to_string()),
+        ],
+    };
+    timeline_page(&header, &timelines)
 }
 
 /// Every frame of every run.

@@ -5,7 +5,9 @@ mod evaluate;
 mod info;
 mod look;
 mod maps;
+mod play;
 mod render;
+mod script;
 mod skip;
 mod source;
 mod tradeoff;
@@ -23,6 +25,8 @@ pub(crate) enum VolumeCommand {
     Render(Box<render::RenderArgs>),
     /// Measure what step, termination, interpolation and resolution cost and give, and recommend a setting
     Tradeoff(Box<tradeoff::TradeoffArgs>),
+    /// Play a sequence of views at a frame rate, and leave a timeline
+    Play(Box<play::PlayArgs>),
     /// Compare ways to hold a frame time over scripted sequences
     Evaluate(Box<evaluate::EvaluateArgs>),
 }
@@ -33,6 +37,7 @@ pub(crate) fn run(command: &VolumeCommand) -> Result<(), Failure> {
         VolumeCommand::Info(args) => info::run(args),
         VolumeCommand::Render(args) => render::run(args),
         VolumeCommand::Tradeoff(args) => tradeoff::run(args),
+        VolumeCommand::Play(args) => play::run(args),
         VolumeCommand::Evaluate(args) => evaluate::run(args),
     }
 }

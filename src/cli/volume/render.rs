@@ -237,16 +237,18 @@ fn write(image: &Image, path: &Path, frame: Option<u32>) -> Result<(), Failure> 
             path.with_file_name(format!("{stem}-{frame:04}.{ending}"))
         }
     };
-    // Colours of transfer functions are those of a screen.
+    write_picture(image, &path)
+}
+
+/// Writes a picture; colours of transfer functions are those of a screen.
+pub(super) fn write_picture(image: &Image, path: &Path) -> Result<(), Failure> {
     let screen = Display {
         curve: ToneCurve::Screen,
         ..Display::default()
     };
     match path.extension() {
-        Some(ending) if ending.eq_ignore_ascii_case("png") => {
-            write_png(&path, image, &screen)?;
-        }
-        _ => write_image(&path, image)?,
+        Some(ending) if ending.eq_ignore_ascii_case("png") => write_png(path, image, &screen)?,
+        _ => write_image(path, image)?,
     }
     Ok(())
 }
