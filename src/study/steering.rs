@@ -479,7 +479,8 @@ impl Summary {
 
 /// 0 of nothing.
 fn root_mean_square(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|v| v * v).sum();
+    // The sum of nothing is −0.
+    let squares = values.iter().fold(0.0, |sum, v| sum + v * v);
     (squares / values.len().max(1) as f64).sqrt()
 }
 
