@@ -167,7 +167,9 @@ impl<V: Voxel> TileKernel<'_, V> {
 
         let mut lanes = LaneStates::<N>::idle();
         let mut work = Work::default();
-        while let Some(enough) = lanes.refill::<true>(&mut queue, frame.termination, self.results) {
+        while let Some(enough) =
+            lanes.refill::<true, COUNT>(&mut queue, frame.termination, self.results)
+        {
             let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),

@@ -65,6 +65,8 @@ impl<V: Voxel> TileKernel<'_, V> {
         let mut rays = [RayLattice::NONE; N];
         let mut hits = Vec::new();
         queue.rays.reserve(self.results.len());
+        // The loops that ask for parts: all but that with the distance map.
+        let has_parts = frame.details.is_some() || frame.distances.is_none();
         for y in (0..height).step_by(lanes_down as usize) {
             for x in (0..width).step_by(SIDE as usize) {
                 let (mut xs, mut ys, mut jitter) = ([0.0; N], [0.0; N], [0.0; N]);
@@ -101,10 +103,12 @@ impl<V: Voxel> TileKernel<'_, V> {
                             continue;
                         }
                     }
+                    if has_parts {
+                        queue.parts.push([start, queue.intervals.len() as u32]);
+                    }
                     queue.rays.push(Waiting {
                         samples: *samples,
                         pixel,
-                        intervals: [start, queue.intervals.len() as u32],
                     });
                 }
             }
@@ -195,7 +199,9 @@ impl<V: Voxel> TileKernel<'_, V> {
 
         let mut lanes = LaneStates::<N>::idle();
         let mut work = Work::default();
-        while let Some(enough) = lanes.refill::<PARTS>(&mut queue, *termination, self.results) {
+        while let Some(enough) =
+            lanes.refill::<PARTS, COUNT>(&mut queue, *termination, self.results)
+        {
             let field = shape.seen_from(lanes.origins());
             let step = [
                 L::load(&lanes.step[0]),

@@ -12,14 +12,14 @@ use super::{RayResult, RayWork, view::RayLattice};
 pub(crate) struct Waiting {
     pub(crate) samples: RayLattice,
     pub(crate) pixel: u32,
-    /// Its intervals in the queue, from one to before another; none: all its samples.
-    pub(crate) intervals: [u32; 2],
 }
 
 /// The rays of a tile.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Queue {
     pub(crate) rays: Vec<Waiting>,
+    /// Where rays have parts, the intervals of each: from one to before another.
+    pub(crate) parts: Vec<[u32; 2]>,
     /// Numbers of first and last samples.
     pub(crate) intervals: Vec<[f32; 2]>,
     next: usize,
@@ -71,10 +71,10 @@ impl<const N: usize> LaneStates<N> {
     }
 
     /// Idle lanes go on with the next interval of their rays, where rays have `PARTS`, or give their
-    /// results and take the next rays. Returns how many lanes must stay busy until the next time;
-    /// `None` if all is done.
+    /// results, with their work if that is to `COUNT`, and take the next rays. Returns how many lanes
+    /// must stay busy until the next time; `None` if all is done.
     #[inline(always)]
-    pub(crate) fn refill<const PARTS: bool>(
+    pub(crate) fn refill<const PARTS: bool, const COUNT: bool>(
         &mut self,
         queue: &mut Queue,
         termination: f32,
@@ -96,18 +96,22 @@ impl<const N: usize> LaneStates<N> {
                     }
                     last = self.ray_last[lane];
                 }
-                results[self.pixel[lane] as usize] = self.result(lane, last);
+                results[self.pixel[lane] as usize] = self.result::<COUNT>(lane, last);
                 self.pixel[lane] = NO_PIXEL;
             }
             if let Some(ray) = queue.rays.get(queue.next) {
-                queue.next += 1;
                 self.take(lane, ray);
+                if COUNT {
+                    (self.samples[lane], self.skips[lane]) = (0.0, 0.0);
+                }
                 if PARTS {
                     self.ray_last[lane] = ray.samples.last;
-                    self.intervals[lane] = ray.intervals;
-                    self.skips[lane] = (ray.intervals[1] - ray.intervals[0]) as f32;
+                    let part = queue.parts[queue.next];
+                    self.intervals[lane] = part;
+                    self.skips[lane] = (part[1] - part[0]) as f32;
                     self.take_interval(lane, queue);
                 }
+                queue.next += 1;
                 busy += 1;
             }
         }
@@ -141,8 +145,6 @@ impl<const N: usize> LaneStates<N> {
         self.k[lane] = samples.first;
         self.last[lane] = samples.last;
         self.pixel[lane] = ray.pixel;
-        self.samples[lane] = 0.0;
-        self.skips[lane] = 0.0;
     }
 
     /// Goes on with the next interval of a ray, if there is one.
@@ -159,7 +161,7 @@ impl<const N: usize> LaneStates<N> {
     }
 
     #[inline(always)]
-    fn result(&self, lane: usize, last: f32) -> RayResult {
+    fn result<const COUNT: bool>(&self, lane: usize, last: f32) -> RayResult {
         RayResult {
             colour: [
                 self.colour[0][lane],
@@ -168,9 +170,13 @@ impl<const N: usize> LaneStates<N> {
             ],
             opacity: self.opacity[lane],
             end: last + 1.0 + self.number[lane],
-            work: RayWork {
-                samples: self.samples[lane] as u32,
-                skips: self.skips[lane] as u32,
+            work: if COUNT {
+                RayWork {
+                    samples: self.samples[lane] as u32,
+                    skips: self.skips[lane] as u32,
+                }
+            } else {
+                RayWork::default()
             },
         }
     }
