@@ -327,6 +327,14 @@ fn trees_around_what_is_seen_change_no_pixel_and_looks_do() {
     );
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("power of two"));
+    for args in [["--block-edge", "8"], ["-D", "branching_factor=2"]] {
+        let output = raywright(
+            folder.path(),
+            &[&["volume", "render", "nebula"], &args[..]].concat(),
+        );
+        assert_eq!(output.status.code(), Some(2));
+        assert!(text(&output.stderr).contains("--skipping hull"));
+    }
 }
 
 #[test]

@@ -56,6 +56,11 @@ pub(crate) struct ParameterOptions {
 }
 
 impl ParameterOptions {
+    /// Whether none was given.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.parameters.is_empty()
+    }
+
     /// `base` with the parameters that were given, checked.
     pub(crate) fn applied_to(&self, base: BuildParams) -> Result<BuildParams, Failure> {
         let mut params = base;

@@ -164,6 +164,13 @@ impl FrameClock for Timer {
         }
     }
 
+    fn overhead(&self) -> f64 {
+        match self {
+            Self::Work(timer) => timer.overhead(),
+            Self::Wall(start) => start.elapsed().as_secs_f64(),
+        }
+    }
+
     fn elapsed(&self, work: &Work) -> f64 {
         match self {
             Self::Work(timer) => timer.elapsed(work),

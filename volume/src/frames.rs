@@ -29,7 +29,10 @@ pub trait FrameClock {
     /// A span of frame `frame` begins.
     fn start(&mut self, frame: u64);
 
-    /// Seconds since then, in which this work was done.
+    /// Seconds since then, in which no ray was cast.
+    fn overhead(&self) -> f64;
+
+    /// Seconds since then, in which rays were cast, with this work.
     fn elapsed(&self, work: &Work) -> f64;
 }
 
@@ -53,12 +56,12 @@ impl FrameClock for WorkTimer {
         self.frame = frame;
     }
 
+    fn overhead(&self) -> f64 {
+        0.0
+    }
+
     fn elapsed(&self, work: &Work) -> f64 {
-        if *work == Work::default() {
-            0.0
-        } else {
-            self.clock.time(work, self.frame)
-        }
+        self.clock.time(work, self.frame)
     }
 }
 
@@ -238,11 +241,10 @@ impl<'a> FrameLoop<'a> {
             .estimate
             .estimate(moment.camera, size, &options, frame as u32)?;
         let outlook = Outlook::new(&estimate, self.volume, &moment.camera, size, options.step);
-        let nothing = Work::default();
-        let left = (target - clock.elapsed(&nothing)).max(LEAST_SHARE * target);
+        let left = (target - clock.overhead()).max(LEAST_SHARE * target);
         self.steering.set_target(left)?;
         let mut pass = self.steering.begin(&self.predictor.frame(&outlook));
-        let overhead = clock.elapsed(&nothing);
+        let overhead = clock.overhead();
         let mut spent = 0.0;
         loop {
             options.step = pass.quality.step as f32;

@@ -3,9 +3,9 @@
 
 use raywright_imaging::Camera;
 use raywright_volume::{
-    CastOptions, EstimateMethod, Estimator, FramePredictor, Mode, Next, Outlook, PredictorParams,
-    Raycaster, Steering, SteeringParams, Volume, WorkClock, generate,
-    predict::{Lesson, WorkCosts},
+    Estimator, FrameLoop, FrameLoopParams, Mode, PredictorParams, Raycaster, SteeringParams,
+    Volume, WorkClock, WorkTimer, generate,
+    predict::WorkCosts,
     presets::preset,
     sequence::{
         Sequence,
@@ -50,38 +50,18 @@ fn lead(
 ) -> Vec<Shown> {
     let caster = Raycaster::new(volume).expect("a volume of usual size");
     let estimator = Estimator::new(volume);
-    let mut predictor = FramePredictor::new(predictor).expect("parameters");
-    let mut steering = Steering::new(params.for_volume(volume)).expect("parameters");
-    let frames = 0..sequence.frames();
-    let shown = frames.map(|frame| {
+    let mut all = FrameLoopParams::new(params, SIZE);
+    all.predictor = predictor;
+    let mut frames = FrameLoop::new(volume, &caster, &estimator, all).expect("parameters");
+    let mut timer = WorkTimer::new(clock.clone());
+    let shown = (0..sequence.frames()).map(|frame| {
         let moment = sequence.at(sequence.time_of(frame)).expect("a moment");
-        let mut options = CastOptions::default();
-        let estimate = estimator
-            .prepare(&moment.function, EstimateMethod::MeanExtinction)
-            .estimate(moment.camera, SIZE, &options, frame as u32)
-            .expect("an estimate");
-        let outlook = Outlook::new(&estimate, volume, &moment.camera, SIZE, options.step);
-        let mut pass = steering.begin(&predictor.frame(&outlook));
-        loop {
-            options.step = pass.quality.step as f32;
-            let picture = caster.render(&moment.function, moment.camera, SIZE, &options);
-            let work = picture.expect("a picture").work;
-            let time = clock.time(&work, frame);
-            let lesson = predictor.learn(&outlook, pass.quality, &work, time);
-            assert_ne!(lesson, Ok(Lesson::Stale));
-            match steering.finish(time).expect("a pass had begun") {
-                Next::DrawAgain(again) => pass = again,
-                Next::Shown {
-                    quality,
-                    frame_time,
-                } => {
-                    return Shown {
-                        step: quality.step,
-                        load: frame_time / params.target,
-                        predicted: pass.forecast.map(|forecast| forecast.time / time),
-                    };
-                }
-            }
+        let drawn = frames.draw(&moment, &mut timer).expect("a frame");
+        Shown {
+            step: drawn.quality.step,
+            load: drawn.frame_time / params.target,
+            predicted: (params.mode == Mode::Predicted)
+                .then(|| drawn.prediction.time / drawn.cast_time),
         }
     });
     shown.collect()

@@ -22,9 +22,9 @@ pub(crate) struct SkipOptions {
     /// How empty space is left out; changes no pixel
     #[arg(long, value_enum, default_value_t = Skip::Distance)]
     skipping: Skip,
-    /// Cells along the edge of the blocks of a hull or segments: 4, 8, 16 and so on
-    #[arg(long, default_value_t = 16)]
-    block_edge: u32,
+    /// Cells along the edge of the blocks of a hull or segments: 4, 8, 16 (default) and so on
+    #[arg(long)]
+    block_edge: Option<u32>,
     #[command(flatten)]
     parameters: ParameterOptions,
 }
@@ -39,20 +39,31 @@ impl SkipOptions {
         let kind = match self.skipping {
             Skip::None => {
                 options.skipping = Skipping::None;
-                return Ok(());
+                return self.without_tree();
             }
             Skip::Distance => {
                 options.skipping = Skipping::Distance;
-                return Ok(());
+                return self.without_tree();
             }
             Skip::Hull => EnclosureKind::Hull,
             Skip::Segments => EnclosureKind::Segments,
         };
         let mut params = EnclosureParams::new(kind);
-        params.block_edge = self.block_edge;
+        params.block_edge = self.block_edge.unwrap_or(params.block_edge);
         params.build = self.parameters.applied_to(params.build)?;
         prepared.enclose(&params, &mut Default::default())?;
         options.skipping = Skipping::Enclosure;
         Ok(())
+    }
+
+    /// Refuses what only a tree has a use for.
+    fn without_tree(&self) -> Result<(), Failure> {
+        if self.block_edge.is_none() && self.parameters.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::with_hint(
+            anyhow::anyhow!("there is no tree that --block-edge and -D could be about"),
+            "give --skipping hull or --skipping segments too",
+        ))
     }
 }

@@ -116,11 +116,7 @@ fn check_appearance(
     let mut prepared = caster.prepare_appearance(appearance.clone()).unwrap();
     let expected = prepared.render_slowly(camera, size, &options).unwrap();
     for (skipping, enclosure) in ways_to_skip() {
-        if let Some(enclosure) = &enclosure {
-            prepared
-                .enclose(enclosure, &mut BuildWorkspace::default())
-                .unwrap();
-        }
+        enclose(&mut prepared, enclosure.as_ref());
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             let options = CastOptions {
                 isa,
@@ -139,6 +135,13 @@ fn check_appearance(
         }
     }
     expected
+}
+
+fn enclose(prepared: &mut Prepared<'_>, enclosure: Option<&EnclosureParams>) {
+    if let Some(params) = enclosure {
+        let mut workspace = BuildWorkspace::default();
+        prepared.enclose(params, &mut workspace).unwrap();
+    }
 }
 
 /// All ways to leave out empty space, with trees of several kinds.
@@ -202,11 +205,7 @@ fn the_work_of_rays_is_that_of_the_picture() {
     for appearance in appearances_with_plain(volume) {
         let mut prepared = caster.prepare_appearance(appearance).unwrap();
         for (skipping, enclosure) in ways_to_skip() {
-            if let Some(enclosure) = &enclosure {
-                prepared
-                    .enclose(enclosure, &mut BuildWorkspace::default())
-                    .unwrap();
-            }
+            enclose(&mut prepared, enclosure.as_ref());
             for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
                 let mut options = CastOptions {
                     isa,
