@@ -89,6 +89,10 @@ impl Way {
         }
     }
 
+    fn is_ours(self) -> bool {
+        matches!(self, Self::Ours | Self::Parts)
+    }
+
     fn params(self, caster: Caster, target: f64, size: [u32; 2]) -> FrameLoopParams {
         let mode = match self {
             Self::NoAdapt => Mode::NoAdapt,
@@ -96,7 +100,6 @@ impl Way {
             Self::Paper | Self::Ours | Self::Parts => Mode::Predicted,
             Self::TwoPass => Mode::TwoPass,
         };
-        let is_ours = matches!(self, Self::Ours | Self::Parts);
         // What errs is put right within the frame: caution would only cost quality.
         let steering = if self == Self::Ours {
             SteeringParams::cautious(mode, target)
@@ -107,7 +110,7 @@ impl Way {
         if self == Self::Parts {
             params.steering.shrink_limit = 0.5;
         }
-        if !is_ours {
+        if !self.is_ours() {
             params.predictor = PredictorParams::paper();
             params.method = EstimateMethod::CubeRoot;
         }
@@ -285,13 +288,17 @@ pub fn run(
     let mut loops = Vec::new();
     for &way in ways {
         let params = way.params(stage.way_to_skip, target, stage.size);
-        let frames = FrameLoop::new(stage.volume, stage.caster, stage.estimator, params)?;
+        let mut frames = FrameLoop::new(stage.volume, stage.caster, stage.estimator, params)?;
+        let mut timer = Timer::new(clock);
+        if way.is_ours() {
+            frames.calibrate(&mut timer)?;
+        }
         let run = Run {
             way,
             target,
             frames: Vec::new(),
         };
-        loops.push((frames, Timer::new(clock), run));
+        loops.push((frames, timer, run));
     }
     let mut last_key = None;
     for frame in 0..sequence.frames() {
@@ -323,6 +330,9 @@ pub fn play(
     let params = way.params(stage.way_to_skip, target, stage.size);
     let mut frames = FrameLoop::new(stage.volume, stage.caster, stage.estimator, params)?;
     let mut timer = Timer::new(clock);
+    if way.is_ours() {
+        frames.calibrate(&mut timer)?;
+    }
     let mut run = Run {
         way,
         target,

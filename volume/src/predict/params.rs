@@ -21,6 +21,9 @@ pub enum SampleUnit {
     Estimated,
     /// A sample that is expected to be taken: the estimate corrected by what frames taught.
     Corrected,
+    /// As much work as a sample costs to begin with, of all that is estimated: rays, jumps, samples and
+    /// the frame itself. So a frame with few samples does not make them dear.
+    Weighted,
 }
 
 /// How frames are predicted.
@@ -75,7 +78,7 @@ impl PredictorParams {
             features: FeatureForm::Scaled(FeatureScales::default()),
             cost: Some(krls.with_forgetting(0.98)),
             target: CostTarget::LogRatio,
-            unit: SampleUnit::Estimated,
+            unit: SampleUnit::Weighted,
             bias: Some(krls.with_forgetting(0.98)),
             speed_memory: Some(5.0),
             fallback: Some([0.1, 0.5]),

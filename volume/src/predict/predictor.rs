@@ -241,7 +241,8 @@ impl FramePredictor {
             prediction.time.max(additive_time),
         );
         // Where there is nothing to sample, times are all overhead, of which little is known.
-        let sampled = prediction.samples > 0.0 && work.samples > 0;
+        let expected = prediction.samples > 0.0;
+        let sampled = expected && work.samples > 0;
         let odd = self.frames > 0 && sampled && !(low / OUTLIER..=high * OUTLIER).contains(&time);
         if odd && self.outliers + 1 >= OUTLIERS {
             self.reset(self.volume_version);
@@ -264,7 +265,7 @@ impl FramePredictor {
         let usual_time = time / self.speed();
         self.additive.learn(&Counts::from(work), usual_time);
         self.learn_counts(outlook, quality, work, &features)?;
-        if !sampled {
+        if !expected {
             return Ok(Lesson::NoSamples);
         }
         let lit = outlook.lit_length / quality.coarseness();
@@ -332,6 +333,10 @@ impl FramePredictor {
         let samples = match self.params.unit {
             SampleUnit::Estimated => outlook.samples(quality),
             SampleUnit::Corrected => counts.samples,
+            SampleUnit::Weighted => {
+                let costs = self.params.cold_start;
+                costs.time(&estimated(outlook, quality)) / costs.sample
+            }
         };
         let additive_time = self.additive.predict(&counts);
         let (mut time, mut novelty, mut unknown) = (additive_time, 1.0, 0.0);

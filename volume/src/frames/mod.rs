@@ -5,10 +5,15 @@
 //! Invariants: what a transfer function needs is prepared once for as long as it is the same; with a
 //! clock that depends on work alone, frames are a function of what was asked for, in order.
 
+mod calibrate;
+mod clock;
+
 use raywright_bvh::BuildWorkspace;
 
+pub use clock::{FrameClock, WorkTimer};
+
 use crate::{
-    cast::{CastError, CastOptions, Picture, Prepared, Raycaster, Work, parts},
+    cast::{CastError, CastOptions, Picture, Prepared, Raycaster, parts},
     enclosure::{EnclosureError, EnclosureParams},
     estimate::{EstimateMethod, Estimator, PreparedEstimate},
     grid::Volume,
@@ -16,54 +21,13 @@ use crate::{
     sequence::Moment,
     steer::{
         Inside, InsideParams, Next, PartShare, Steering, SteeringError, SteeringParams, StepLimits,
-        WorkClock, part_shares,
+        part_shares,
     },
     transfer::TransferFunction,
 };
 
 /// The least that is left of a target for casting, as a share.
 const LEAST_SHARE: f64 = 0.05;
-
-/// Something that measures how long a frame takes.
-pub trait FrameClock {
-    /// A span of frame `frame` begins.
-    fn start(&mut self, frame: u64);
-
-    /// Seconds since then, in which no ray was cast.
-    fn overhead(&self) -> f64;
-
-    /// Seconds since then, in which rays were cast, with this work.
-    fn elapsed(&self, work: &Work) -> f64;
-}
-
-/// A [`WorkClock`] at work: preparing takes no time.
-#[derive(Clone, Debug, Default)]
-pub struct WorkTimer {
-    clock: WorkClock,
-    frame: u64,
-}
-
-impl WorkTimer {
-    /// A timer that begins with frame 0.
-    #[must_use]
-    pub fn new(clock: WorkClock) -> Self {
-        Self { clock, frame: 0 }
-    }
-}
-
-impl FrameClock for WorkTimer {
-    fn start(&mut self, frame: u64) {
-        self.frame = frame;
-    }
-
-    fn overhead(&self) -> f64 {
-        0.0
-    }
-
-    fn elapsed(&self, work: &Work) -> f64 {
-        self.clock.time(work, self.frame)
-    }
-}
 
 /// Whether the step may change on the way through a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,6 +170,18 @@ impl<'a> FrameLoop<'a> {
         &self.predictor
     }
 
+    /// Measures what rays, jumps, samples and a frame itself cost on this machine, some small pictures
+    /// long, and forgets what was learned: to be called before the first frame. Without it a loop begins
+    /// with the costs of its parameters, and learns the rarer ones late.
+    ///
+    /// # Errors
+    /// [`FrameError`].
+    pub fn calibrate(&mut self, clock: &mut impl FrameClock) -> Result<(), FrameError> {
+        self.params.predictor.cold_start = calibrate::costs(self.volume, self.caster, &self.params, clock)?;
+        self.predictor = FramePredictor::new(self.params.predictor)?;
+        Ok(())
+    }
+
     /// Draws what is to be seen at a moment.
     ///
     /// # Errors
@@ -221,7 +197,8 @@ impl<'a> FrameLoop<'a> {
         let target = self.params.steering.target;
         let mut options = self.params.options;
         options.clip = moment.clip;
-        options.step = 1.0;
+        // That of the last frame: whether a short ray has a sample depends on it.
+        options.step = self.steering.shown().map_or(1.0, |shown| shown.step as f32);
         let size = self.params.size;
         let kept = self
             .shown
@@ -326,16 +303,26 @@ impl<'a> Shown<'a> {
         workspace: &mut BuildWorkspace,
         moment: &Moment,
     ) -> Result<Self, FrameError> {
-        let mut prepared = caster.prepare(&moment.function);
-        if let Some(enclosure) = &params.enclosure {
-            prepared.enclose(enclosure, workspace)?;
-        }
         Ok(Self {
             function: moment.function.clone(),
-            prepared,
+            prepared: prepare(caster, params, workspace, &moment.function)?,
             estimate: estimator.prepare(&moment.function, params.method),
         })
     }
+}
+
+/// A function, and the tree around what can be seen if there is to be one.
+fn prepare<'a>(
+    caster: &'a Raycaster<'a>,
+    params: &FrameLoopParams,
+    workspace: &mut BuildWorkspace,
+    function: &TransferFunction,
+) -> Result<Prepared<'a>, FrameError> {
+    let mut prepared = caster.prepare(function);
+    if let Some(enclosure) = &params.enclosure {
+        prepared.enclose(enclosure, workspace)?;
+    }
+    Ok(prepared)
 }
 
 /// A picture with control between its parts, their steps, and the quality of the whole.

@@ -1,0 +1,120 @@
+//! What parts of a frame cost on this machine, before the first frame.
+//!
+//! Three pictures, each with one kind of work more: the volume is out of view, is transparent, is thin
+//! fog. What is common to rays and jumps over nothing cannot be told apart by them, nor samples from
+//! those of which something is seen: these keep the ratio that they were given.
+//!
+//! Invariant: costs are above 0 and finite, whatever the clock says.
+
+use glam::Vec3;
+use raywright_bvh::BuildWorkspace;
+use raywright_imaging::Camera;
+
+use super::{Control, FrameClock, FrameError, FrameLoopParams};
+use crate::{
+    cast::{CastOptions, Prepared, Raycaster, Work},
+    grid::Volume,
+    predict::{Counts, WorkCosts},
+    transfer::{ControlPoint, TransferFunction},
+};
+
+/// Each picture is drawn so many times, and the shortest time counts.
+const REPETITIONS: usize = 3;
+
+/// Opacity of the fog: no ray of usual length ends in it.
+const FOG: f32 = 1e-5;
+
+/// The step in the fog, lengths of a voxel.
+const FOG_STEP: f32 = 4.0;
+
+/// The costs that a loop with these parameters would see.
+pub(super) fn costs(
+    volume: &Volume,
+    caster: &Raycaster<'_>,
+    params: &FrameLoopParams,
+    clock: &mut impl FrameClock,
+) -> Result<WorkCosts, FrameError> {
+    let given = params.predictor.cold_start;
+    let [towards, away] = cameras(volume);
+    let mut workspace = BuildWorkspace::default();
+    let mut prepare = |opacity| super::prepare(caster, params, &mut workspace, &uniform(opacity));
+    let (nothing, fog) = (prepare(0.0)?, prepare(FOG)?);
+    let mut measure = |prepared: &Prepared<'_>, camera| shortest(prepared, camera, params, clock);
+    let (_, fixed) = measure(&nothing, away)?;
+    let (jumps, jumps_time) = measure(&nothing, towards)?;
+    let (samples, samples_time) = measure(&fog, towards)?;
+
+    let mut costs = given;
+    costs.fixed = positive(fixed, given.fixed);
+    let rays_and_jumps =
+        |counts: &Counts, costs: &WorkCosts| costs.ray * counts.rays + costs.skip * counts.skips;
+    let ratio = (jumps_time - costs.fixed) / rays_and_jumps(&jumps, &given);
+    let ratio = positive(ratio, costs.fixed / given.fixed);
+    costs.ray *= ratio;
+    costs.skip *= ratio;
+    let others = costs.fixed + rays_and_jumps(&samples, &costs);
+    let expected = given.sample * samples.samples + given.lit * samples.lit;
+    let ratio = positive((samples_time - others) / expected, ratio);
+    costs.sample *= ratio;
+    costs.lit *= ratio;
+    Ok(costs)
+}
+
+/// A picture's work and its shortest time.
+fn shortest(
+    prepared: &Prepared<'_>,
+    camera: Camera,
+    params: &FrameLoopParams,
+    clock: &mut impl FrameClock,
+) -> Result<(Counts, f64), FrameError> {
+    let options = CastOptions {
+        step: FOG_STEP,
+        clip: None,
+        ..params.options
+    };
+    let (mut work, mut time) = (Work::default(), f64::INFINITY);
+    for _ in 0..REPETITIONS {
+        clock.start(0);
+        let picture = match params.control {
+            Control::Whole => prepared.render(camera, params.size, &options)?,
+            Control::Parts => {
+                prepared.render_in_parts(camera, params.size, &options, |_, _| FOG_STEP)?
+            }
+        };
+        work = picture.work;
+        time = time.min(clock.elapsed(&work));
+    }
+    Ok((Counts::from(&work), time))
+}
+
+/// A camera that has the volume in its picture, and one that has not.
+fn cameras(volume: &Volume) -> [Camera; 2] {
+    let extent = volume.extent();
+    let origin = extent * 0.5 + extent.length() * Vec3::new(0.6, 0.7, 0.8);
+    let camera = |target| Camera {
+        origin,
+        target,
+        up: Vec3::Y,
+        vertical_fov_degrees: 45.0,
+    };
+    [camera(extent * 0.5), camera(origin * 2.0 - extent * 0.5)]
+}
+
+/// A function that has one opacity everywhere.
+fn uniform(opacity: f32) -> TransferFunction {
+    let point = ControlPoint {
+        value: 0.0,
+        colour: [1.0; 3],
+        opacity,
+    };
+    TransferFunction::new(vec![point]).expect("one point in range")
+}
+
+/// A number that can be a cost, or else another.
+fn positive(value: f64, otherwise: f64) -> f64 {
+    if value > 0.0 && value.is_finite() {
+        value
+    } else {
+        otherwise
+    }
+}
