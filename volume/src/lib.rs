@@ -52,7 +52,7 @@ pub use crate::{
     },
     enclosure::{EnclosureError, EnclosureKind, EnclosureParams},
     estimate::{Estimate, EstimateMethod, Estimator, PreparedEstimate},
-    frames::{Control, Drawn, FrameClock, FrameLoop, FrameLoopParams, WorkTimer},
+    frames::{Control, Drawn, FrameClock, FrameLoop, FrameLoopParams, Refined, WorkTimer},
     generate::Generated,
     grid::{GridError, Orientation, ValueScale, Volume, VoxelSlice, Voxels},
     load::{LoadError, LoadOptions, Loaded, RawLayout, load_volume},

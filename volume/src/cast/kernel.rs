@@ -15,6 +15,7 @@ use super::{
     field::{Field, Voxel},
     lanes::{LaneStates, Queue, Waiting},
     space::Space,
+    sparse::Chosen,
     view::{NearRays, RayLattice, Rays, SMALLEST_STEP},
 };
 use crate::table::TransferTable;
@@ -29,6 +30,8 @@ pub(crate) struct TileKernel<'a, V> {
     pub(crate) voxels: &'a [V],
     pub(crate) columns: std::ops::Range<u32>,
     pub(crate) rows: std::ops::Range<u32>,
+    /// Which of them have rays; the rectangle begins at an even column and row.
+    pub(crate) chosen: Chosen<'a>,
     /// Results row by row.
     pub(crate) results: &'a mut [RayResult],
     pub(crate) work: &'a mut Work,
@@ -54,6 +57,14 @@ impl<V: Voxel> LaneKernel for TileKernel<'_, V> {
 }
 
 impl<V: Voxel> TileKernel<'_, V> {
+    /// Whether a pixel of the rectangle has a ray, given that its place was asked for.
+    fn has(&self, x: u32, y: u32) -> bool {
+        match self.chosen {
+            Chosen::Lattice(_) => true,
+            marked => marked.has(self.columns.start + x, self.rows.start + y),
+        }
+    }
+
     /// The rays that have samples, in small squares of pixels.
     #[inline(always)]
     fn set_up<const N: usize, L: GatherLanes<N>>(&mut self, queue: &mut Queue) {
@@ -67,12 +78,13 @@ impl<V: Voxel> TileKernel<'_, V> {
         queue.rays.reserve(self.results.len());
         // The loops that ask for parts: all but that with the distance map.
         let has_parts = frame.details.is_some() || frame.distances.is_none();
-        for y in (0..height).step_by(lanes_down as usize) {
-            for x in (0..width).step_by(SIDE as usize) {
+        let [across, down] = self.chosen.extent(width, height);
+        for y in (0..down).step_by(lanes_down as usize) {
+            for x in (0..across).step_by(SIDE as usize) {
                 let (mut xs, mut ys, mut jitter) = ([0.0; N], [0.0; N], [0.0; N]);
                 for lane in 0..N as u32 {
-                    let column = self.columns.start + x + lane % SIDE;
-                    let row = self.rows.start + y + lane / SIDE;
+                    let [column, row] = self.chosen.pixel(x + lane % SIDE, y + lane / SIDE);
+                    let (column, row) = (self.columns.start + column, self.rows.start + row);
                     xs[lane as usize] = column as f32 + 0.5;
                     ys[lane as usize] = row as f32 + 0.5;
                     jitter[lane as usize] = view.jitter_of(column, row);
@@ -86,8 +98,10 @@ impl<V: Voxel> TileKernel<'_, V> {
                     }
                 }
                 for (lane, samples) in rays.iter().enumerate() {
-                    let (x, y) = (x + lane as u32 % SIDE, y + lane as u32 / SIDE);
-                    if x >= width || y >= height || samples.first > samples.last {
+                    let lane = lane as u32;
+                    let [x, y] = self.chosen.pixel(x + lane % SIDE, y + lane / SIDE);
+                    let is_outside = x >= width || y >= height;
+                    if is_outside || samples.first > samples.last || !self.has(x, y) {
                         continue;
                     }
                     self.work.rays += 1;

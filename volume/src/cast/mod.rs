@@ -12,11 +12,12 @@ mod options;
 mod picture;
 pub(crate) mod reference;
 mod space;
+mod sparse;
 mod tiles;
 pub(crate) mod view;
 
 use raywright_bvh::{BuildWorkspace, TreeStats};
-use raywright_imaging::{AnyCamera, Image, PictureFrame};
+use raywright_imaging::{AnyCamera, Camera, Image, PictureFrame};
 
 use crate::{
     appearance::{Appearance, AppearanceError, Integration, IsoSurface},
@@ -32,6 +33,8 @@ use details::{Details, RawSurface};
 use field::Layout;
 pub use options::{Behind, CastError, CastOptions, Counts, Jitter, Skipping};
 pub use picture::{Picture, RayWork, Work};
+use sparse::Chosen;
+pub use sparse::PixelsPerRay;
 pub use tiles::parts;
 use tiles::{cast_bands, cast_tiles};
 use view::View;
@@ -252,8 +255,8 @@ impl Prepared<'_> {
         size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
-        self.picture(camera.into(), size, options, |frame, picture| {
-            cast_tiles(frame, picture, options.isa);
+        self.picture(camera.into(), size, options, |frame, picture, chosen| {
+            cast_tiles(frame, picture, chosen, options.isa);
         })
     }
 
@@ -268,9 +271,12 @@ impl Prepared<'_> {
         size: [u32; 2],
         options: &CastOptions,
     ) -> Result<Picture, CastError> {
-        self.picture(camera.into(), size, options, |frame, picture| {
+        self.picture(camera.into(), size, options, |frame, picture, chosen| {
             for y in 0..size[1] {
                 for x in 0..size[0] {
+                    if !chosen.has(x, y) {
+                        continue;
+                    }
                     let result = reference::cast(frame, x, y);
                     let pixel = y as usize * size[0] as usize + x as usize;
                     let (colour, opacity) = frame.finish(&result);
@@ -287,7 +293,8 @@ impl Prepared<'_> {
 
     /// The same picture part by part, with a step for each: before each part `step` is asked, which is
     /// told the number of the part and the work of those before. [`parts`] says which rows they have.
-    /// Numbers of samples in [`Picture::end`] are those of the part.
+    /// Numbers of samples in [`Picture::end`] are those of the part. Where pixels share rays, those of
+    /// silhouettes between them come last, with the step of the last part.
     ///
     /// # Errors
     /// As [`Prepared::render`].
@@ -300,16 +307,53 @@ impl Prepared<'_> {
     ) -> Result<Picture, CastError> {
         let rays = camera.into().picture_frame(size[0], size[1])?;
         let mut picture = blank(size, options)?;
+        let mut options = *options;
         let mut work = Work::default();
+        let lattice = options.pixels_per_ray;
         for (part, bands) in tiles::bands_of_parts(&mut picture).into_iter().enumerate() {
-            let mut options = *options;
             options.step = step(part, &work);
             work.add(&self.with_frame(&rays, &options, |frame| {
-                cast_bands(frame, size[0], bands, options.isa)
+                cast_bands(frame, size[0], bands, Chosen::Lattice(lattice), options.isa)
             })?);
         }
         picture.work = work;
+        if lattice != PixelsPerRay::One {
+            self.with_frame(&rays, &options, |frame| {
+                complete(&mut picture, lattice, |picture, chosen| {
+                    cast_tiles(frame, picture, chosen, options.isa);
+                });
+            })?;
+        }
         Ok(picture)
+    }
+
+    /// A picture of which nothing is there yet, for [`Prepared::render_rows`].
+    pub(crate) fn blank(
+        &self,
+        camera: Camera,
+        size: [u32; 2],
+        options: &CastOptions,
+    ) -> Result<Picture, CastError> {
+        self.picture(camera.into(), size, options, |_, _, _| {})
+    }
+
+    /// Casts the next few rows of a picture, from `row` on; returns the row behind them.
+    pub(crate) fn render_rows(
+        &self,
+        camera: Camera,
+        options: &CastOptions,
+        picture: &mut Picture,
+        row: u32,
+    ) -> Result<u32, CastError> {
+        let size = [picture.image.width(), picture.image.height()];
+        let rays = AnyCamera::from(camera).picture_frame(size[0], size[1])?;
+        let (bands, end) = tiles::bands_from(picture, row);
+        let work = self.with_frame(&rays, options, |frame| {
+            let all = Chosen::Lattice(PixelsPerRay::One);
+            cast_bands(frame, size[0], bands, all, options.isa)
+        })?;
+        picture.work.add(&work);
+        Ok(end)
     }
 
     fn picture(
@@ -317,13 +361,17 @@ impl Prepared<'_> {
         camera: AnyCamera,
         size: [u32; 2],
         options: &CastOptions,
-        cast: impl FnOnce(&Frame<'_>, &mut Picture),
+        mut cast: impl FnMut(&Frame<'_>, &mut Picture, Chosen<'_>),
     ) -> Result<Picture, CastError> {
         let rays = camera.picture_frame(size[0], size[1])?;
         let mut picture = blank(size, options)?;
         self.with_frame(&rays, options, |frame| {
             picture.base = frame.view.base();
-            cast(frame, &mut picture);
+            let lattice = options.pixels_per_ray;
+            cast(frame, &mut picture, Chosen::Lattice(lattice));
+            complete(&mut picture, lattice, |picture, chosen| {
+                cast(frame, picture, chosen);
+            });
         })?;
         Ok(picture)
     }
@@ -370,6 +418,25 @@ impl Prepared<'_> {
             details: details.as_ref(),
         }))
     }
+}
+
+/// Makes the pixels of a picture that are not on the lattice.
+fn complete(
+    picture: &mut Picture,
+    lattice: PixelsPerRay,
+    cast: impl FnOnce(&mut Picture, Chosen<'_>),
+) {
+    if lattice == PixelsPerRay::One {
+        return;
+    }
+    let marks = sparse::silhouettes(picture, lattice);
+    let width = picture.image.width();
+    let chosen = Chosen::Marked {
+        marks: &marks,
+        width,
+    };
+    cast(picture, chosen);
+    sparse::fill(picture, lattice, &marks);
 }
 
 /// A picture in which there is nothing yet.

@@ -3,6 +3,8 @@
 use raywright_bvh::{Aabb, Isa, Vec3};
 use raywright_imaging::{CameraError, FilmError};
 
+use super::PixelsPerRay;
+
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -16,6 +18,8 @@ pub struct CastOptions {
     /// The box outside which nothing is seen, world units; `None` for the whole volume. It moves no
     /// sample. An inverted box contains nothing.
     pub clip: Option<Aabb>,
+    /// How many pixels share a ray; those without one are made of their neighbours.
+    pub pixels_per_ray: PixelsPerRay,
     /// How empty space is left out. Changes no pixel.
     pub skipping: Skipping,
     /// Whether samples are moved along their rays.
@@ -33,6 +37,7 @@ impl Default for CastOptions {
             termination: 0.98,
             behind: Behind::TheSame,
             clip: None,
+            pixels_per_ray: PixelsPerRay::One,
             skipping: Skipping::Distance,
             jitter: Jitter::None,
             counts: Counts::Total,

@@ -10,7 +10,9 @@ use std::{ops::Range, sync::Mutex};
 use rayon::prelude::*;
 use raywright_bvh::Isa;
 
-use super::{Frame, Picture, RayResult, RayWork, Work, field::Layout, kernel::TileKernel};
+use super::{
+    Frame, Picture, RayResult, RayWork, Work, field::Layout, kernel::TileKernel, sparse::Chosen,
+};
 
 /// Side of a tile, pixels.
 const TILE_SIZE: u32 = 32;
@@ -84,14 +86,31 @@ pub(crate) fn bands_of_parts(picture: &mut Picture) -> Vec<Vec<Band<'_>>> {
     of_parts
 }
 
-/// Casts all rays of a picture by lanes.
-pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, isa: Isa) {
+/// The next few bands of a picture from a row on, one for each thread, and the row behind them.
+pub(crate) fn bands_from(picture: &mut Picture, row: u32) -> (Vec<Band<'_>>, u32) {
+    let height = picture.image.height();
+    let mut own = bands(picture, PIECE_ROWS);
+    own.retain(|band| band.rows.start >= row);
+    own.truncate(rayon::current_num_threads());
+    let end = own.last().map_or(height, |band| band.rows.end);
+    (own, end)
+}
+
+/// Casts the rays of the chosen pixels of a picture by lanes, and adds what they took.
+pub(crate) fn cast_tiles(frame: &Frame<'_>, picture: &mut Picture, chosen: Chosen<'_>, isa: Isa) {
     let width = picture.image.width();
-    picture.work = cast_bands(frame, width, bands(picture, TILE_SIZE), isa);
+    let work = cast_bands(frame, width, bands(picture, TILE_SIZE), chosen, isa);
+    picture.work.add(&work);
 }
 
 /// Casts the rays of bands of a picture that is so wide.
-pub(crate) fn cast_bands(frame: &Frame<'_>, width: u32, bands: Vec<Band<'_>>, isa: Isa) -> Work {
+pub(crate) fn cast_bands(
+    frame: &Frame<'_>,
+    width: u32,
+    bands: Vec<Band<'_>>,
+    chosen: Chosen<'_>,
+    isa: Isa,
+) -> Work {
     let total = Mutex::new(Work::default());
     bands.into_par_iter().for_each(|band| {
         let rows = band.rows;
@@ -106,12 +125,17 @@ pub(crate) fn cast_bands(frame: &Frame<'_>, width: u32, bands: Vec<Band<'_>>, is
                 isa,
                 columns.clone(),
                 rows.clone(),
+                chosen,
                 &mut tile,
                 &mut work,
             );
             for (row, own) in tile.chunks_exact(columns.len()).enumerate() {
                 let start = row * width as usize + columns.start as usize;
-                for (pixel, result) in (start..).zip(own) {
+                let y = rows.start + row as u32;
+                for ((pixel, x), result) in (start..).zip(columns.clone()).zip(own) {
+                    if !chosen.has(x, y) {
+                        continue;
+                    }
                     let (colour, opacity) = frame.finish(result);
                     band.colours[pixel] = colour;
                     band.opacities[pixel] = opacity;
@@ -132,6 +156,7 @@ fn cast_tile(
     isa: Isa,
     columns: Range<u32>,
     rows: Range<u32>,
+    chosen: Chosen<'_>,
     results: &mut [RayResult],
     work: &mut Work,
 ) {
@@ -144,6 +169,7 @@ fn cast_tile(
                     voxels: $voxels,
                     columns,
                     rows,
+                    chosen,
                     results,
                     work,
                 },

@@ -24,8 +24,10 @@ const REPETITIONS: usize = 3;
 /// Opacity of the fog: no ray of usual length ends in it.
 const FOG: f32 = 1e-5;
 
-/// The step in the fog, lengths of a voxel.
-const FOG_STEP: f32 = 4.0;
+/// The step in the fog, lengths of a voxel, as usual; and the side of its picture over that of others,
+/// so that it is not long in drawing.
+const STEP: f32 = 1.0;
+const FOG_SIDE: f32 = 0.5;
 
 /// The costs that a loop with these parameters would see.
 pub(super) fn costs(
@@ -39,10 +41,13 @@ pub(super) fn costs(
     let mut workspace = BuildWorkspace::default();
     let mut prepare = |opacity| super::prepare(caster, params, &mut workspace, &uniform(opacity));
     let (nothing, fog) = (prepare(0.0)?, prepare(FOG)?);
-    let mut measure = |prepared: &Prepared<'_>, camera| shortest(prepared, camera, params, clock);
-    let (_, fixed) = measure(&nothing, away)?;
-    let (jumps, jumps_time) = measure(&nothing, towards)?;
-    let (samples, samples_time) = measure(&fog, towards)?;
+    let mut measure = |prepared: &Prepared<'_>, camera, side: f32| {
+        let size = params.size.map(|n| (n as f32 * side).ceil() as u32);
+        shortest(prepared, camera, size, params, clock)
+    };
+    let (_, fixed) = measure(&nothing, away, 1.0)?;
+    let (jumps, jumps_time) = measure(&nothing, towards, 1.0)?;
+    let (samples, samples_time) = measure(&fog, towards, FOG_SIDE)?;
 
     let mut costs = given;
     costs.fixed = positive(fixed, given.fixed);
@@ -64,11 +69,12 @@ pub(super) fn costs(
 fn shortest(
     prepared: &Prepared<'_>,
     camera: Camera,
+    size: [u32; 2],
     params: &FrameLoopParams,
     clock: &mut impl FrameClock,
 ) -> Result<(Counts, f64), FrameError> {
     let options = CastOptions {
-        step: FOG_STEP,
+        step: STEP,
         clip: None,
         ..params.options
     };
@@ -76,10 +82,8 @@ fn shortest(
     for _ in 0..REPETITIONS {
         clock.start(0);
         let picture = match params.control {
-            Control::Whole => prepared.render(camera, params.size, &options)?,
-            Control::Parts => {
-                prepared.render_in_parts(camera, params.size, &options, |_, _| FOG_STEP)?
-            }
+            Control::Whole => prepared.render(camera, size, &options)?,
+            Control::Parts => prepared.render_in_parts(camera, size, &options, |_, _| STEP)?,
         };
         work = picture.work;
         time = time.min(clock.elapsed(&work));
@@ -90,7 +94,7 @@ fn shortest(
 /// A camera that has the volume in its picture, and one that has not.
 fn cameras(volume: &Volume) -> [Camera; 2] {
     let extent = volume.extent();
-    let origin = extent * 0.5 + extent.length() * Vec3::new(0.6, 0.7, 0.8);
+    let origin = extent * 0.5 + extent.length() * Vec3::new(0.3, 0.4, 1.0);
     let camera = |target| Camera {
         origin,
         target,

@@ -7,8 +7,10 @@
 
 mod calibrate;
 mod clock;
+mod rest;
 
 use raywright_bvh::BuildWorkspace;
+use rest::Rest;
 
 pub use clock::{FrameClock, WorkTimer};
 
@@ -20,8 +22,8 @@ use crate::{
     predict::{FramePredictor, Outlook, PredictError, Prediction, PredictorParams, Quality},
     sequence::Moment,
     steer::{
-        Inside, InsideParams, Next, PartShare, Steering, SteeringError, SteeringParams, StepLimits,
-        part_shares,
+        Inside, InsideParams, Next, PartRatios, PartShare, Steering, SteeringError, SteeringParams,
+        StepLimits, part_shares,
     },
     transfer::TransferFunction,
 };
@@ -127,7 +129,9 @@ pub struct FrameLoop<'a> {
     params: FrameLoopParams,
     steering: Steering,
     predictor: FramePredictor,
+    part_ratios: PartRatios,
     shown: Option<Shown<'a>>,
+    rest: Option<Rest>,
     workspace: BuildWorkspace,
     frame: u64,
 }
@@ -157,8 +161,10 @@ impl<'a> FrameLoop<'a> {
             estimator,
             steering: Steering::new(params.steering.for_volume(volume))?,
             predictor: FramePredictor::new(params.predictor)?,
+            part_ratios: PartRatios::default(),
             params,
             shown: None,
+            rest: None,
             workspace: BuildWorkspace::default(),
             frame: 0,
         })
@@ -177,7 +183,8 @@ impl<'a> FrameLoop<'a> {
     /// # Errors
     /// [`FrameError`].
     pub fn calibrate(&mut self, clock: &mut impl FrameClock) -> Result<(), FrameError> {
-        self.params.predictor.cold_start = calibrate::costs(self.volume, self.caster, &self.params, clock)?;
+        self.params.predictor.cold_start =
+            calibrate::costs(self.volume, self.caster, &self.params, clock)?;
         self.predictor = FramePredictor::new(self.params.predictor)?;
         Ok(())
     }
@@ -197,6 +204,7 @@ impl<'a> FrameLoop<'a> {
         let target = self.params.steering.target;
         let mut options = self.params.options;
         options.clip = moment.clip;
+        self.rest = None;
         // That of the last frame: whether a short ray has a sample depends on it.
         options.step = self.steering.shown().map_or(1.0, |shown| shown.step as f32);
         let size = self.params.size;
@@ -225,6 +233,7 @@ impl<'a> FrameLoop<'a> {
         let mut spent = 0.0;
         loop {
             options.step = pass.quality.step as f32;
+            options.pixels_per_ray = pass.quality.pixels_per_ray;
             clock.start(frame);
             let (picture, steps, quality) = match self.params.control {
                 Control::Whole => {
@@ -233,11 +242,21 @@ impl<'a> FrameLoop<'a> {
                 }
                 Control::Parts => {
                     let rows = parts(size[1]);
-                    let shares = part_shares(&estimate, size[1], &rows);
+                    let mut shares = part_shares(&estimate, size[1], &rows);
+                    self.part_ratios.correct(&mut shares);
                     let limits = self.steering.params().limits;
                     let (predictor, left) = (&self.predictor, left - spent);
                     let inside = inside(predictor, &outlook, pass.quality, left, limits, shares)?;
-                    in_parts(&shown.prepared, moment, size, &options, inside, clock)?
+                    let ratios = &mut self.part_ratios;
+                    in_parts(
+                        &shown.prepared,
+                        moment,
+                        size,
+                        &options,
+                        inside,
+                        ratios,
+                        clock,
+                    )?
                 }
             };
             let time = clock.elapsed(&picture.work);
@@ -252,6 +271,9 @@ impl<'a> FrameLoop<'a> {
                     spent += time;
                 }
                 Next::Shown { frame_time, .. } => {
+                    let shortest = self.steering.params().limits.shortest;
+                    let rest = Rest::new(moment.camera, size, options, quality, shortest);
+                    self.rest = Some(rest);
                     return Ok(Drawn {
                         picture,
                         quality,
@@ -270,6 +292,44 @@ impl<'a> FrameLoop<'a> {
     }
 }
 
+/// What became of a picture in a time in which nothing moved.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Refined {
+    /// A finer picture, with this step, lengths of a voxel.
+    Finer(Box<Picture>, f64),
+    /// Nothing yet: the time was up.
+    Unfinished,
+    /// There is nothing finer: the last picture is the one that a direct render makes with the shortest
+    /// step, bit for bit.
+    Done,
+}
+
+impl FrameLoop<'_> {
+    /// Refines the picture of the last frame for at most the target, since nothing moved; to be called
+    /// again until it is done, or something moves, which [`draw`](Self::draw) is for. It stops within some
+    /// rows of pixels, and goes on where it stopped.
+    ///
+    /// # Errors
+    /// [`FrameError`].
+    pub fn refine(&mut self, clock: &mut impl FrameClock) -> Result<Refined, FrameError> {
+        let (Some(rest), Some(shown)) = (&mut self.rest, &self.shown) else {
+            return Ok(Refined::Done);
+        };
+        if rest.is_done() {
+            return Ok(Refined::Done);
+        }
+        clock.start(self.frame);
+        self.frame += 1;
+        let target = self.params.steering.target;
+        let finer = rest.advance(&shown.prepared, |work| clock.elapsed(work) < target)?;
+        Ok(match finer {
+            Some((picture, step)) => Refined::Finer(Box::new(picture), step),
+            None => Refined::Unfinished,
+        })
+    }
+}
+
 /// Control of a pass that may take `target` seconds.
 fn inside(
     predictor: &FramePredictor,
@@ -281,7 +341,7 @@ fn inside(
 ) -> Result<Inside, FrameError> {
     let prediction = predictor.predict(outlook, quality)?;
     let costs = predictor.additive().costs();
-    let all = costs.time(&prediction.counts);
+    let all = costs.time(&prediction.counts) - costs.fixed;
     let samples = costs.sample * prediction.counts.samples + costs.lit * prediction.counts.lit;
     let share = if all > 0.0 { samples / all } else { 1.0 };
     Ok(Inside::new(InsideParams::new(
@@ -332,11 +392,21 @@ fn in_parts(
     size: [u32; 2],
     options: &CastOptions,
     mut inside: Inside,
+    ratios: &mut PartRatios,
     clock: &impl FrameClock,
 ) -> Result<(Picture, Vec<f64>, Quality), FrameError> {
+    let mut begun = Vec::with_capacity(size[1].min(64) as usize);
     let picture = prepared.render_in_parts(moment.camera, size, options, |_, work| {
-        inside.next_step(clock.elapsed(work)) as f32
+        let elapsed = clock.elapsed(work);
+        begun.push(elapsed);
+        inside.next_step(elapsed) as f32
     })?;
-    let quality = Quality::with_step(inside.mean_step());
+    begun.push(clock.elapsed(&picture.work));
+    let times: Vec<f64> = begun.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    ratios.learn(&inside, &times);
+    let quality = Quality {
+        step: inside.mean_step(),
+        pixels_per_ray: options.pixels_per_ray,
+    };
     Ok((picture, inside.steps().to_vec(), quality))
 }

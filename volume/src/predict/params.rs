@@ -53,11 +53,11 @@ pub struct PredictorParams {
 }
 
 impl PredictorParams {
-    /// The paper's: the cost of a sample by a kernel model of raw features that forgets nothing.
+    /// The paper's: the cost of a sample by a kernel model of its features that forgets nothing.
     #[must_use]
     pub fn paper() -> Self {
         Self {
-            features: FeatureForm::Raw,
+            features: FeatureForm::Scaled(FeatureScales::paper()),
             cost: Some(KrlsParams::default()),
             target: CostTarget::Cost,
             unit: SampleUnit::Estimated,

@@ -3,37 +3,7 @@
 //! Invariant of the order: with the same picture, time falls as [`Quality::coarseness`] rises, as far
 //! as it depends on samples alone.
 
-use serde::{Deserialize, Serialize};
-
-/// Pixels for which one ray is cast.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum PixelsPerRay {
-    /// A ray for every pixel.
-    #[default]
-    One,
-    /// A ray for every second pixel, like the black fields of a checkerboard.
-    Checker,
-    /// A ray for four pixels, two by two.
-    Four,
-}
-
-impl PixelsPerRay {
-    /// All of them, finest first.
-    pub const ALL: [Self; 3] = [Self::One, Self::Checker, Self::Four];
-
-    /// How many pixels share a ray.
-    #[must_use]
-    pub fn count(self) -> f64 {
-        match self {
-            Self::One => 1.0,
-            Self::Checker => 2.0,
-            Self::Four => 4.0,
-        }
-    }
-}
+pub use crate::cast::PixelsPerRay;
 
 /// How finely a frame is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@
 //! does not depend on the step; measured over expected time of the parts that are done says how wrong
 //! that is, the more parts the better.
 //!
-//! Invariants: a step is on a ladder of eighths of an octave from that of the frame, at most an octave
+//! Invariants: a step is on a ladder of sixteenths of an octave from that of the frame, at most half an octave
 //! shorter and two octaves longer, and within its limits; equal times give equal steps.
 
 use std::ops::Range;
@@ -18,13 +18,17 @@ use crate::estimate::{Estimate, TILE_SIZE};
 const AIM: f64 = 0.99;
 
 /// Expected times of the whole frame, over the target, between which nothing is changed.
-const CALM: [f64; 2] = [0.94, 1.0];
+const CALM: [f64; 2] = [0.97, 1.0];
 
 /// Rungs of the ladder to an octave.
-const RUNGS: f64 = 8.0;
+const RUNGS: f64 = 16.0;
+
+/// Octaves from the step of the frame to the shortest and the longest of its parts.
+const FINEST: f64 = -0.5;
+const COARSEST: f64 = 2.0;
 
 /// The time of the prediction that measured times are weighed against, as a share of the frame.
-const TRUST: f64 = 1.0 / 64.0;
+const TRUST: f64 = 1.0 / 32.0;
 
 /// The share of a part in the work of its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +63,61 @@ pub fn part_shares(estimate: &Estimate, height: u32, parts: &[Vec<Range<u32>>]) 
         }
     };
     parts.iter().map(share).collect()
+}
+
+/// How much of what the last frame taught about its parts is believed.
+const RATIO_WEIGHT: f64 = 0.5;
+
+/// The largest ratio of a part, and the smallest as its inverse.
+const MOST_RATIO: f64 = 4.0;
+
+/// What parts of earlier frames took over what was expected of them, relative to their frames. An
+/// estimate errs in the same places from frame to frame, and what is known before needs no change of
+/// step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartRatios {
+    ratios: Vec<f64>,
+}
+
+impl PartRatios {
+    /// Makes the shares of the next frame those that are to be expected.
+    pub fn correct(&self, shares: &mut [PartShare]) {
+        if self.ratios.len() != shares.len() {
+            return;
+        }
+        let (mut length, mut pixels) = (0.0, 0.0);
+        for (share, ratio) in shares.iter_mut().zip(&self.ratios) {
+            share.length *= ratio;
+            share.pixels *= ratio;
+            length += share.length;
+            pixels += share.pixels;
+        }
+        for share in shares {
+            share.length /= length;
+            share.pixels /= pixels;
+        }
+    }
+
+    /// Learns from a frame, each part of which took so many seconds; with shares that were corrected.
+    pub fn learn(&mut self, inside: &Inside, times: &[f64]) {
+        let params = &inside.params;
+        let count = params.shares.len();
+        if times.len() != count || inside.steps.len() != count {
+            return;
+        }
+        if self.ratios.len() != count {
+            self.ratios = vec![1.0; count];
+        }
+        let expected: Vec<f64> = (0..count).map(|part| inside.expected_share(part)).collect();
+        let rate = times.iter().sum::<f64>() / expected.iter().sum::<f64>();
+        for ((ratio, time), expected) in self.ratios.iter_mut().zip(times).zip(expected) {
+            let error = time / (expected * rate);
+            if error > 0.0 && error.is_finite() {
+                let wish = *ratio * error.powf(RATIO_WEIGHT);
+                *ratio = wish.clamp(1.0 / MOST_RATIO, MOST_RATIO);
+            }
+        }
+    }
 }
 
 /// What is known before the first part.
@@ -110,6 +169,8 @@ impl InsideParams {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inside {
     params: InsideParams,
+    /// Seconds before the first part, which belong to none.
+    start: f64,
     steps: Vec<f64>,
 }
 
@@ -118,13 +179,17 @@ impl Inside {
     #[must_use]
     pub fn new(params: InsideParams) -> Self {
         Self {
+            start: 0.0,
             steps: Vec::with_capacity(params.shares.len()),
             params,
         }
     }
 
-    /// The step of the next part, `elapsed` seconds after the beginning of the first.
+    /// The step of the next part, `elapsed` seconds after the beginning of the frame.
     pub fn next_step(&mut self, elapsed: f64) -> f64 {
+        if self.steps.is_empty() {
+            self.start = elapsed;
+        }
         let step = self.solved(elapsed);
         self.steps.push(step);
         step
@@ -152,6 +217,14 @@ impl Inside {
         }
     }
 
+    /// What a part that was begun is expected to take, as a share of the expected time.
+    fn expected_share(&self, part: usize) -> f64 {
+        let share = &self.params.shares[part];
+        let samples = self.params.sample_share * share.length;
+        samples * self.params.step / self.steps[part]
+            + (1.0 - self.params.sample_share) * share.pixels
+    }
+
     fn solved(&self, elapsed: f64) -> f64 {
         let InsideParams {
             target,
@@ -166,14 +239,12 @@ impl Inside {
         };
         let samples = |share: &PartShare| sample_share * share.length;
         let others = |share: &PartShare| (1.0 - sample_share) * share.pixels;
-        let (done, left) = shares.split_at(self.steps.len().min(shares.len()));
-        let done: f64 = done
-            .iter()
-            .zip(&self.steps)
-            .map(|(share, own)| samples(share) * step / own + others(share))
-            .sum();
+        let begun = self.steps.len().min(shares.len());
+        let left = &shares[begun..];
+        let done: f64 = (0..begun).map(|part| self.expected_share(part)).sum();
         // Seconds for what is expected to take the whole expected time.
-        let rate = (elapsed + TRUST * expected) / (done + TRUST);
+        let expected = (expected - self.start).max(0.0);
+        let rate = (elapsed - self.start + TRUST * expected) / (done + TRUST);
         let left_samples = rate * left.iter().map(samples).sum::<f64>();
         let left_others = rate * left.iter().map(others).sum::<f64>();
         let total = elapsed + left_others + left_samples * step / last;
@@ -189,7 +260,7 @@ impl Inside {
         // Up, so that the budget holds.
         let rung = ((wish / step).log2() * RUNGS)
             .ceil()
-            .clamp(-RUNGS, 2.0 * RUNGS);
+            .clamp(FINEST * RUNGS, COARSEST * RUNGS);
         (step * (rung / RUNGS).exp2()).clamp(limits.shortest, limits.longest)
     }
 }
@@ -225,8 +296,8 @@ mod tests {
 
     #[test]
     fn a_right_prediction_changes_nothing() {
-        let (time, inside) = lead(0.95, 0.8, |_| 1.0);
-        assert!((time - 0.95).abs() < 1e-9);
+        let (time, inside) = lead(0.98, 0.8, |_| 1.0);
+        assert!((time - 0.98).abs() < 1e-9);
         assert!(inside.steps().iter().all(|&step| step == 1.0));
         assert_eq!(inside.mean_step(), 1.0);
     }
@@ -240,7 +311,7 @@ mod tests {
         }
         // What is too fast becomes finer.
         let (time, inside) = lead(0.95, 0.8, |_| 0.6);
-        assert!(time > 0.8 && time < 1.0, "{time}");
+        assert!(time > 0.7 && time < 1.0, "{time}");
         assert!(inside.mean_step() < 1.0);
     }
 
@@ -256,6 +327,51 @@ mod tests {
             let (_, inside) = lead(0.95, 0.9, |_| wrong);
             assert!(inside.steps().iter().all(|step| (0.5..=4.0).contains(step)));
         }
+    }
+
+    #[test]
+    fn what_a_part_takes_is_known_from_the_last_frame() {
+        // An estimate that errs by up to four times, in the same places always.
+        let truth = |part: usize| [0.5, 1.0, 2.0, 0.7][part % 4];
+        let given = vec![
+            PartShare {
+                length: 1.0 / 16.0,
+                pixels: 1.0 / 16.0,
+            };
+            16
+        ];
+        let mut ratios = PartRatios::default();
+        let spreads: Vec<f64> = (0..12)
+            .map(|_| {
+                let mut shares = given.clone();
+                ratios.correct(&mut shares);
+                let params = InsideParams::new(1.0, 0.98, 0.8, 1.0, LIMITS, shares);
+                let mut inside = Inside::new(params);
+                // Something is done before the first part, and is no part of it.
+                let mut elapsed = 0.03;
+                let mut times = Vec::new();
+                for (part, share) in given.iter().enumerate() {
+                    let step = inside.next_step(elapsed);
+                    let work = 0.8 * share.length / step + 0.2 * share.pixels;
+                    times.push(0.95 * truth(part) / 1.05 * work);
+                    elapsed += times[part];
+                }
+                ratios.learn(&inside, &times);
+                let steps = inside.steps().iter().copied();
+                steps.clone().fold(0.0, f64::max) / steps.fold(f64::INFINITY, f64::min)
+            })
+            .collect();
+        assert!(spreads[0] > 1.5, "{spreads:?}");
+        assert!(spreads[11] < 1.1, "{spreads:?}");
+        // Times that cannot be teach nothing.
+        let before = ratios.clone();
+        let mut inside = Inside::new(InsideParams::new(1.0, 1.0, 0.8, 1.0, LIMITS, given.clone()));
+        for _ in 0..16 {
+            inside.next_step(f64::NAN);
+        }
+        ratios.learn(&inside, &[f64::NAN; 16]);
+        ratios.learn(&inside, &[0.1; 3]);
+        assert_eq!(ratios, before);
     }
 
     #[test]

@@ -21,7 +21,7 @@ mod search;
 
 pub(crate) use clock::unit;
 pub use clock::{SpeedChange, WorkClock};
-pub use inside::{Inside, InsideParams, PartShare, part_shares};
+pub use inside::{Inside, InsideParams, PartRatios, PartShare, part_shares};
 pub use mode::{Mode, Next, Pass, Resolution, Steering, SteeringError, SteeringParams};
 pub use model::{Forecast, NoModel, TimeModel};
 pub use search::{MAX_EVALUATIONS, SearchEnd, StepFound, StepLimits, TOLERANCE, search_step};

@@ -2,6 +2,7 @@
 
 mod details;
 mod geometry;
+mod sparse;
 
 use glam::Vec3;
 use proptest::prelude::*;
