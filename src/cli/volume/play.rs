@@ -3,13 +3,17 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{
+    Args,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
+};
 use raywright::{
     report::timeline::{Timeline, TimelineHeader, timeline_page},
-    study::steering::{Caster, Clock, FrameRow, Run, Stage, Summary, Way, play},
+    study::steering::{Clock, FrameRow, Run, Stage, Summary, Way, play},
     volume::{
         Estimator, Raycaster, Sequence,
         sequence::script::{Start, thirty_seconds},
+        steer::Resolution,
     },
 };
 
@@ -18,35 +22,6 @@ use crate::cli::{
     Failure, output,
     run_options::{RunOptions, cancel_on_interrupt},
 };
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Mode {
-    /// A step of 0.75 voxels
-    NoAdapt,
-    /// From the time of the last frame
-    LastFrame,
-    /// From the prediction of the paper
-    Paper,
-    /// From our prediction
-    Ours,
-    /// The same, and the step may change within a frame
-    Parts,
-    /// A coarse pass, and a finer one if there is time
-    TwoPass,
-}
-
-impl From<Mode> for Way {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::NoAdapt => Self::NoAdapt,
-            Mode::LastFrame => Self::LastFrame,
-            Mode::Paper => Self::Paper,
-            Mode::Ours => Self::Ours,
-            Mode::Parts => Self::Parts,
-            Mode::TwoPass => Self::TwoPass,
-        }
-    }
-}
 
 #[derive(Debug, Args)]
 pub(crate) struct PlayArgs {
@@ -65,8 +40,11 @@ pub(crate) struct PlayArgs {
     #[arg(long, default_value_t = 10.0)]
     target_fps: f64,
     /// How the step is chosen
-    #[arg(long, value_enum, default_value_t = Mode::Parts)]
-    mode: Mode,
+    #[arg(long, value_parser = ways(), default_value = Way::Parts.key())]
+    mode: Way,
+    /// Let our ways leave out rays where steps of two voxels are not enough
+    #[arg(long)]
+    fewer_rays: bool,
     /// Tell the time by counted work instead of the wall: repeatable to the last bit
     #[arg(long)]
     work_clock: bool,
@@ -84,6 +62,15 @@ pub(crate) struct PlayArgs {
     output: PathBuf,
     #[command(flatten)]
     run: RunOptions,
+}
+
+/// The ways by their names.
+fn ways() -> impl TypedValueParser<Value = Way> {
+    let values = Way::ALL.map(|way| PossibleValue::new(way.key()).help(way.what()));
+    PossibleValuesParser::new(values).map(|key| {
+        let named = Way::ALL.into_iter().find(|way| way.key() == key);
+        named.expect("a value that is possible")
+    })
 }
 
 /// Plays and leaves a timeline; after an interruption, that of the frames so far.
@@ -108,13 +95,11 @@ pub(crate) fn run(args: &PlayArgs) -> Result<(), Failure> {
         let folder = output::folder(&args.output)?;
         let caster = Raycaster::new(&stage.volume)?;
         let estimator = Estimator::new(&stage.volume);
-        let own = Stage {
-            volume: &stage.volume,
-            caster: &caster,
-            estimator: &estimator,
-            way_to_skip: Caster::Map,
-            size: [args.width, args.height],
-        };
+        let size = [args.width, args.height];
+        let mut own = Stage::new(&stage.volume, &caster, &estimator, size);
+        if args.fewer_rays {
+            own.resolution = Resolution::Ladder;
+        }
         let clock = if args.work_clock {
             Clock::Work {
                 noise: 0.0,
@@ -127,26 +112,19 @@ pub(crate) fn run(args: &PlayArgs) -> Result<(), Failure> {
         let name = args.volume.stem();
         let bar = output::bar((sequence.duration_s * 1e3) as usize, "");
         let (mut frame, mut fault) = (0_u32, None);
-        let run = play(
-            &own,
-            &sequence,
-            args.mode.into(),
-            target,
-            clock,
-            |row, image| {
-                bar.set_position((row.time * 1e3) as u64);
-                bar.set_message(live(row, target));
-                if args
-                    .save_every
-                    .is_some_and(|every| frame.is_multiple_of(every))
-                {
-                    let path = folder.join(format!("{name}-{frame:05}.png"));
-                    fault = write_picture(image, &path).err();
-                }
-                frame += 1;
-                fault.is_none() && !cancel.is_cancelled()
-            },
-        )?;
+        let run = play(&own, &sequence, args.mode, target, clock, |row, image| {
+            bar.set_position((row.time * 1e3) as u64);
+            bar.set_message(live(row, target));
+            if args
+                .save_every
+                .is_some_and(|every| frame.is_multiple_of(every))
+            {
+                let path = folder.join(format!("{name}-{frame:05}.png"));
+                fault = write_picture(image, &path).err();
+            }
+            frame += 1;
+            fault.is_none() && !cancel.is_cancelled()
+        })?;
         bar.finish_and_clear();
         if let Some(fault) = fault {
             return Err(fault);

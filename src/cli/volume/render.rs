@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use raywright::{
     bvh::{Aabb, Vec3},
     imaging::{AnyCamera, Display, Image, ToneCurve, write_image, write_png},
-    volume::{Behind, CastOptions, Counts, Jitter, Raycaster, Work},
+    volume::{Behind, CastOptions, Counts, Jitter, Raycaster, Work, cast::PixelsPerRay},
 };
 
 use super::{
@@ -31,6 +31,16 @@ enum BehindEnd {
     TheSame,
     /// Nothing, which darkens
     Nothing,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Rays {
+    /// Each has its own
+    One,
+    /// Two, as on a checkerboard
+    Checker,
+    /// Four, two by two
+    Four,
 }
 
 #[derive(Debug, Args)]
@@ -71,6 +81,9 @@ pub(crate) struct RenderArgs {
     /// Move the samples of each pixel by a share of a step of its own: rings become noise
     #[arg(long)]
     jitter: bool,
+    /// Pixels that share a ray; those without one are made of their neighbours, save on silhouettes
+    #[arg(long, value_enum, default_value_t = Rays::One)]
+    pixels_per_ray: Rays,
     #[command(flatten)]
     skip: SkipOptions,
     /// Render so many frames around the target of the camera
@@ -121,6 +134,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
             BehindEnd::Nothing => Behind::Nothing,
         };
         options.clip = args.clip.as_deref().map(clip_box).transpose()?;
+        options.pixels_per_ray = match args.pixels_per_ray {
+            Rays::One => PixelsPerRay::One,
+            Rays::Checker => PixelsPerRay::Checker,
+            Rays::Four => PixelsPerRay::Four,
+        };
         if args.jitter {
             options.jitter = Jitter::PerPixel;
         }

@@ -39,7 +39,8 @@ pub(super) fn costs(
     let given = params.predictor.cold_start;
     let [towards, away] = cameras(volume);
     let mut workspace = BuildWorkspace::default();
-    let mut prepare = |opacity| super::prepare(caster, params, &mut workspace, &uniform(opacity));
+    let mut prepare =
+        |opacity| super::prepare(caster, params, &mut workspace, &uniform(opacity).into());
     let (nothing, fog) = (prepare(0.0)?, prepare(FOG)?);
     let mut measure = |prepared: &Prepared<'_>, camera, side: f32| {
         let size = params.size.map(|n| (n as f32 * side).ceil() as u32);

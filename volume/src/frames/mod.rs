@@ -15,6 +15,7 @@ use rest::Rest;
 pub use clock::{FrameClock, WorkTimer};
 
 use crate::{
+    appearance::{Appearance, AppearanceError, IsoSurface},
     cast::{CastError, CastOptions, Picture, Prepared, Raycaster, parts},
     enclosure::{EnclosureError, EnclosureParams},
     estimate::{EstimateMethod, Estimator, PreparedEstimate},
@@ -25,7 +26,6 @@ use crate::{
         Inside, InsideParams, Next, PartRatios, PartShare, Steering, SteeringError, SteeringParams,
         StepLimits, part_shares,
     },
-    transfer::TransferFunction,
 };
 
 /// The least that is left of a target for casting, as a share.
@@ -83,6 +83,9 @@ pub enum FrameError {
     /// No picture.
     #[error(transparent)]
     Cast(#[from] CastError),
+    /// A surface.
+    #[error(transparent)]
+    Appearance(#[from] AppearanceError),
     /// No tree around what can be seen.
     #[error(transparent)]
     Enclosure(#[from] EnclosureError),
@@ -136,10 +139,10 @@ pub struct FrameLoop<'a> {
     frame: u64,
 }
 
-/// What was prepared for a transfer function.
+/// What was prepared for a transfer function, and surfaces if there are any.
 #[derive(Debug)]
 struct Shown<'a> {
-    function: TransferFunction,
+    appearance: Appearance,
     prepared: Prepared<'a>,
     estimate: PreparedEstimate<'a>,
 }
@@ -208,17 +211,24 @@ impl<'a> FrameLoop<'a> {
         // That of the last frame: whether a short ray has a sample depends on it.
         options.step = self.steering.shown().map_or(1.0, |shown| shown.step as f32);
         let size = self.params.size;
+        let appearance = appearance(moment);
         let kept = self
             .shown
             .take()
-            .filter(|shown| shown.function == moment.function);
+            .filter(|shown| shown.appearance == appearance);
         let shown = match kept {
             Some(shown) => shown,
             None => {
                 let Self {
                     caster, estimator, ..
                 } = *self;
-                Shown::new(caster, estimator, &self.params, &mut self.workspace, moment)?
+                Shown::new(
+                    caster,
+                    estimator,
+                    &self.params,
+                    &mut self.workspace,
+                    appearance,
+                )?
             }
         };
         let shown = &*self.shown.insert(shown);
@@ -355,30 +365,42 @@ fn inside(
 }
 
 impl<'a> Shown<'a> {
-    /// What the transfer function of a moment needs.
+    /// What an appearance needs. An estimate knows nothing of surfaces: what they change is learned.
     fn new(
         caster: &'a Raycaster<'a>,
         estimator: &'a Estimator<'a>,
         params: &FrameLoopParams,
         workspace: &mut BuildWorkspace,
-        moment: &Moment,
+        appearance: Appearance,
     ) -> Result<Self, FrameError> {
         Ok(Self {
-            function: moment.function.clone(),
-            prepared: prepare(caster, params, workspace, &moment.function)?,
-            estimate: estimator.prepare(&moment.function, params.method),
+            prepared: prepare(caster, params, workspace, &appearance)?,
+            estimate: estimator.prepare(&appearance.function, params.method),
+            appearance,
         })
     }
 }
 
-/// A function, and the tree around what can be seen if there is to be one.
+/// What is to be seen at a moment: its surfaces are white and opaque.
+fn appearance(moment: &Moment) -> Appearance {
+    let mut appearance = Appearance::from(moment.function.clone());
+    let surfaces = moment.iso_values.iter().map(|&value| IsoSurface {
+        value,
+        colour: [1.0; 3],
+        opacity: 1.0,
+    });
+    appearance.surfaces = surfaces.collect();
+    appearance
+}
+
+/// An appearance, and the tree around what can be seen if there is to be one.
 fn prepare<'a>(
     caster: &'a Raycaster<'a>,
     params: &FrameLoopParams,
     workspace: &mut BuildWorkspace,
-    function: &TransferFunction,
+    appearance: &Appearance,
 ) -> Result<Prepared<'a>, FrameError> {
-    let mut prepared = caster.prepare(function);
+    let mut prepared = caster.prepare_appearance(appearance.clone())?;
     if let Some(enclosure) = &params.enclosure {
         prepared.enclose(enclosure, workspace)?;
     }

@@ -59,6 +59,17 @@ pub struct Moment {
     pub idle: bool,
 }
 
+impl Moment {
+    /// Whether the same is to be seen as at another moment: nothing moved.
+    #[must_use]
+    pub fn shows_the_same(&self, other: &Self) -> bool {
+        self.camera == other.camera
+            && self.clip == other.clip
+            && self.function == other.function
+            && self.iso_values == other.iso_values
+    }
+}
+
 impl Sequence {
     /// Frames of the whole sequence, from 1: a frame at every 1/`fps` seconds before the end.
     #[must_use]
