@@ -25,6 +25,15 @@ const STYLE_SHEET: &str = include_str!("page/style.css");
 /// Length of the table of the best configurations.
 const BEST_SHOWN: usize = 10;
 
+/// A picture in a page; `png` is its file.
+pub(super) fn picture(alt: &str, png: &[u8]) -> String {
+    format!(
+        "<img alt=\"{}\" src=\"data:image/png;base64,{}\">",
+        escape(alt),
+        base64(png)
+    )
+}
+
 /// The page of `run` as HTML; `picture_png` is the rendered picture as a PNG file.
 pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
     let header = &run.header;
@@ -39,10 +48,7 @@ pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
     let mut body = result(run, &trials);
     if let Some(png) = picture_png {
         body.push_str(&figure(
-            &format!(
-                "<img alt=\"The rendered scene\" src=\"data:image/png;base64,{}\">",
-                base64(png)
-            ),
+            &picture("The rendered scene", png),
             &format!(
                 "The scene at {} × {} pixels; the configuration of the tree does not change the \
                  picture, only the time.",

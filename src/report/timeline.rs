@@ -4,7 +4,7 @@
 use super::{
     markup::escape,
     page::{
-        document, figure,
+        document, figure, picture,
         table::{Cell, Table},
     },
     svg::{
@@ -21,6 +21,10 @@ pub struct Timeline<'a> {
     pub title: String,
     /// The runs, all with the same moments.
     pub runs: Vec<&'a Run>,
+    /// Pictures beside each other below its plots, as PNG.
+    pub pictures: Vec<Vec<u8>>,
+    /// What the pictures show.
+    pub caption: String,
 }
 
 /// What stands on a page beside its timelines.
@@ -64,6 +68,17 @@ pub fn timeline_page(header: &TimelineHeader, timelines: &[Timeline<'_>]) -> Str
     for timeline in timelines {
         body.push_str(&format!("<h2>{}</h2>\n", escape(&timeline.title)));
         body.push_str(&figures(timeline));
+        if !timeline.pictures.is_empty() {
+            let pictures = timeline
+                .pictures
+                .iter()
+                .map(|png| picture(&timeline.caption, png));
+            let beside = format!(
+                "<div class=\"beside\">{}</div>",
+                pictures.collect::<String>()
+            );
+            body.push_str(&figure(&beside, &timeline.caption));
+        }
     }
     let settings = header.settings.iter();
     let table = Table {

@@ -39,7 +39,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{}, {steps}, {} frames", path.display(), frames.len());
         println!("{:40} {:^31}   {:^31}", "", "work clock", "wall");
         for (name, params) in predictors() {
-            let clock = WorkClock::new(WorkCosts::default()).with_noise(0.02, 7);
+            // Not what predictors begin with.
+            let costs = WorkCosts {
+                ray: 20e-9,
+                skip: 8e-9,
+                sample: 5e-9,
+                lit: 0.9e-9,
+                fixed: 110e-6,
+            };
+            let clock = WorkClock::new(costs).with_noise(0.02, 7);
             let work = run(params, &frames, |index, frame| {
                 clock.time(&frame.work, index)
             })?;
@@ -111,7 +119,14 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
         params.cost = plus.cost.map(|krls| krls.with_forgetting(forgetting));
         params
     };
+    let mut paper_mean = PredictorParams::paper();
+    paper_mean.cost = paper_mean
+        .cost
+        .map(|krls| krls.with_gamma(1e-12).with_forgetting(0.9));
+    let mut raw = PredictorParams::paper();
+    raw.features = FeatureForm::Raw;
     vec![
+        ("paper, raw features", raw),
         ("paper", PredictorParams::paper()),
         ("plus", plus),
         ("plus, cost as such", with(|p| p.target = CostTarget::Cost)),
@@ -119,9 +134,19 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
             "plus, unit corrected",
             with(|p| p.unit = SampleUnit::Corrected),
         ),
+        (
+            "plus, unit estimated",
+            with(|p| p.unit = SampleUnit::Estimated),
+        ),
         ("plus, no speed", with(|p| p.speed_memory = None)),
         ("plus, no fallback", with(|p| p.fallback = None)),
         ("plus, no kernel model", with(|p| p.cost = None)),
+        // A kernel that is the same everywhere: the mean of the costs, the recent ones above all.
+        (
+            "plus, running mean",
+            with(|p| p.cost = p.cost.map(|krls| krls.with_gamma(1e-12))),
+        ),
+        ("paper, running mean", paper_mean),
         ("plus, forgetting 1", forgetting(1.0)),
         ("plus, forgetting 0.95", forgetting(0.95)),
         ("plus, no direction", scales(|s| s.direction = 0.0)),

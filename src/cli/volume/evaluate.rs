@@ -16,7 +16,7 @@ use raywright::{
     },
 };
 
-use super::{script::views, source::VolumeOptions};
+use super::{maps::terminations, render::write_picture, script::views, source::VolumeOptions};
 use crate::cli::{
     Failure, output,
     run_options::{RunOptions, cancel_on_interrupt},
@@ -70,7 +70,13 @@ pub(crate) struct EvaluateArgs {
 struct OfVolume {
     name: String,
     runs: Vec<(Caster, String, Run)>,
+    /// Where rays end, as PNG: see [`CAPTION`].
+    terminations: Vec<Vec<u8>>,
 }
+
+/// What the pictures of terminations show.
+const CAPTION: &str = "Where rays end in the dense overview, where they were expected to, and the \
+                       difference four times: the nearer the brighter.";
 
 /// Runs all sequences in all ways and prints the table, the goals and where they were missed.
 pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
@@ -90,7 +96,15 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
             let mut of_volume = OfVolume {
                 name: options.stem(),
                 runs: Vec::new(),
+                terminations: Vec::new(),
             };
+            let size = [args.side; 2];
+            let ends = terminations(volume, &caster, &views.dense, views.overview, size)?;
+            for (image, what) in ends.iter().zip(["true", "estimated", "error"]) {
+                let path = folder.join(format!("{}-ends-{what}.png", options.stem()));
+                write_picture(image, &path)?;
+                of_volume.terminations.push(fs::read(&path)?);
+            }
             for (caster_name, &seed) in Caster::ALL
                 .into_iter()
                 .flat_map(|c| args.seeds.iter().map(move |s| (c, s)))
@@ -391,6 +405,12 @@ fn page(
                         .filter(|(_, s, _)| s == first)
                         .map(|(_, _, run)| run)
                         .collect(),
+                    pictures: if caster == Caster::Map {
+                        volume.terminations.clone()
+                    } else {
+                        Vec::new()
+                    },
+                    caption: CAPTION.to_owned(),
                 });
             }
         }

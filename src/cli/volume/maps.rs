@@ -3,10 +3,10 @@
 
 use clap::ValueEnum;
 use raywright::{
-    imaging::{AnyCamera, Image},
+    imaging::{AnyCamera, Camera, Image},
     volume::{
-        CastOptions, Counts, EstimateMethod, Estimator, Picture, TransferFunction, Volume,
-        estimate::TILE_SIZE,
+        CastOptions, Counts, EstimateMethod, Estimator, Picture, Raycaster, TransferFunction,
+        Volume, estimate::TILE_SIZE,
     },
 };
 
@@ -69,6 +69,30 @@ impl From<Method> for EstimateMethod {
             Method::PaperLinear => Self::PaperLinear,
         }
     }
+}
+
+/// Where rays end, where they were expected to, and the difference four times: figure 4 of the paper.
+pub(super) fn terminations(
+    volume: &Volume,
+    caster: &Raycaster<'_>,
+    function: &TransferFunction,
+    camera: Camera,
+    size: [u32; 2],
+) -> Result<[Image; 3], Failure> {
+    let options = CastOptions::default();
+    let picture = caster.prepare(function).render(camera, size, &options)?;
+    let draw = |map| {
+        Maps::new(map, volume, function, EstimateMethod::MeanExtinction).draw(
+            &picture,
+            camera.into(),
+            &options,
+        )
+    };
+    Ok([
+        draw(Map::Termination)?,
+        draw(Map::Estimated)?,
+        draw(Map::Error)?,
+    ])
 }
 
 /// Draws pictures of rays through a volume.

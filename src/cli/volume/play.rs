@@ -155,6 +155,8 @@ pub(crate) fn run(args: &PlayArgs) -> Result<(), Failure> {
         let timeline = Timeline {
             title: "Frame by frame".into(),
             runs: vec![&run],
+            pictures: Vec::new(),
+            caption: String::new(),
         };
         std::fs::write(&page, timeline_page(&header, &[timeline]))?;
         output::line(page.display())?;

@@ -34,7 +34,7 @@ pub struct FrameRow {
     pub frame_time: f64,
     /// Seconds of what is shown.
     pub cast_time: f64,
-    /// Seconds before the first ray.
+    /// Seconds of everything but casting.
     pub overhead: f64,
     /// Predicted for what is shown, seconds.
     pub predicted: f64,

@@ -38,7 +38,7 @@ pub struct Summary {
     pub samples: f64,
     /// The same of predicted ÷ true cost of an estimated sample.
     pub cost: f64,
-    /// Median of the time before the first ray.
+    /// Median of the time of everything but casting.
     pub overhead: f64,
 }
 

@@ -18,8 +18,8 @@ use crate::{
     transfer::{ControlPoint, TransferFunction},
 };
 
-/// Each picture is drawn so many times, and the shortest time counts.
-const REPETITIONS: usize = 3;
+/// Each picture is drawn so many times, and the median of times counts.
+const REPETITIONS: usize = 5;
 
 /// Opacity of the fog: no ray of usual length ends in it.
 const FOG: f32 = 1e-5;
@@ -44,7 +44,7 @@ pub(super) fn costs(
     let (nothing, fog) = (prepare(0.0)?, prepare(FOG)?);
     let mut measure = |prepared: &Prepared<'_>, camera, side: f32| {
         let size = params.size.map(|n| (n as f32 * side).ceil() as u32);
-        shortest(prepared, camera, size, params, clock)
+        median(prepared, camera, size, params, clock)
     };
     let (_, fixed) = measure(&nothing, away, 1.0)?;
     let (jumps, jumps_time) = measure(&nothing, towards, 1.0)?;
@@ -66,8 +66,8 @@ pub(super) fn costs(
     Ok(costs)
 }
 
-/// A picture's work and its shortest time.
-fn shortest(
+/// A picture's work and its median time.
+fn median(
     prepared: &Prepared<'_>,
     camera: Camera,
     size: [u32; 2],
@@ -79,17 +79,18 @@ fn shortest(
         clip: None,
         ..params.options
     };
-    let (mut work, mut time) = (Work::default(), f64::INFINITY);
-    for _ in 0..REPETITIONS {
+    let (mut work, mut times) = (Work::default(), [0.0; REPETITIONS]);
+    for time in &mut times {
         clock.start(0);
         let picture = match params.control {
             Control::Whole => prepared.render(camera, size, &options)?,
             Control::Parts => prepared.render_in_parts(camera, size, &options, |_, _| STEP)?,
         };
         work = picture.work;
-        time = time.min(clock.elapsed(&work));
+        *time = clock.elapsed(&work);
     }
-    Ok((Counts::from(&work), time))
+    times.sort_by(f64::total_cmp);
+    Ok((Counts::from(&work), times[REPETITIONS / 2]))
 }
 
 /// A camera that has the volume in its picture, and one that has not.

@@ -111,7 +111,7 @@ pub struct Drawn {
     pub frame_time: f64,
     /// Seconds of what is shown alone.
     pub cast_time: f64,
-    /// Seconds before the first ray: preparing, estimating, predicting, choosing.
+    /// Seconds of everything but casting: preparing, estimating, predicting, choosing, learning.
     pub overhead: f64,
     /// What was predicted for what is shown, at the quality that it got in the end.
     pub prediction: Prediction,
@@ -239,7 +239,7 @@ impl<'a> FrameLoop<'a> {
         let left = (target - clock.overhead()).max(LEAST_SHARE * target);
         self.steering.set_target(left)?;
         let mut pass = self.steering.begin(&self.predictor.frame(&outlook));
-        let overhead = clock.overhead();
+        let mut overhead = clock.overhead();
         let mut spent = 0.0;
         loop {
             options.step = pass.quality.step as f32;
@@ -272,8 +272,10 @@ impl<'a> FrameLoop<'a> {
             let time = clock.elapsed(&picture.work);
             let prediction = self.predictor.predict(&outlook, quality)?;
             let estimated_samples = outlook.samples(quality);
+            clock.start(frame);
             self.predictor
                 .learn(&outlook, quality, &picture.work, time)?;
+            overhead += clock.overhead();
             self.steering.drew(quality);
             match self.steering.finish(time)? {
                 Next::DrawAgain(again) => {

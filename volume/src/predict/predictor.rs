@@ -53,6 +53,11 @@ const KNOWN: f64 = 0.1;
 /// Frames over which ratios of counts are averaged.
 const RATIO_MEMORY: f64 = 10.0;
 
+/// Limit of the logarithm of a cost's ratio to that of the first frame. Where all work is weighed it is
+/// a few at most, and more is an odd frame.
+const MAX_LOG_COST: f64 = 20.0;
+const MAX_LOG_WEIGHTED: f64 = 1.6;
+
 /// Units of costs for the kernel model, seconds: numbers near 1.
 const COST_UNIT: f64 = 1e-9;
 
@@ -277,7 +282,10 @@ impl FramePredictor {
         if let Some(model) = &mut self.cost {
             let target = match self.params.target {
                 CostTarget::Cost => cost / COST_UNIT,
-                CostTarget::LogRatio => (cost / first_cost).ln(),
+                CostTarget::LogRatio => {
+                    let limit = self.params.unit.most_log_cost();
+                    (cost / first_cost).ln().clamp(-limit, limit)
+                }
             };
             model.learn(&features, target)?;
         }
@@ -347,7 +355,10 @@ impl FramePredictor {
             let known = model.predict_with_deviation(&features)?;
             let cost = match self.params.target {
                 CostTarget::Cost => known.mean * COST_UNIT,
-                CostTarget::LogRatio => first_cost * known.mean.clamp(-20.0, 20.0).exp(),
+                CostTarget::LogRatio => {
+                    let limit = self.params.unit.most_log_cost();
+                    first_cost * known.mean.clamp(-limit, limit).exp()
+                }
             };
             // A cost that is learned as such may be predicted to be negative.
             if cost > 0.0 {
@@ -417,6 +428,15 @@ impl FramePredictor {
         costs.sort_by(f64::total_cmp);
         let index = (costs.len() as f64 * SAFE_QUANTILE) as usize;
         costs.get(index.min(costs.len().saturating_sub(1))).copied()
+    }
+}
+
+impl SampleUnit {
+    fn most_log_cost(self) -> f64 {
+        match self {
+            Self::Estimated | Self::Corrected => MAX_LOG_COST,
+            Self::Weighted => MAX_LOG_WEIGHTED,
+        }
     }
 }
 
