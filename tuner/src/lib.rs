@@ -65,7 +65,8 @@ pub use error::{SpaceError, TellError};
 pub use param::{Condition, Kind, Param, Scale};
 pub use record::Record;
 pub use search::{
-    Estimate, LatinHypercubeNelderMead, Proposal, Random, SEARCH_NAMES, Search, search_by_name,
+    Estimate, GaussianProcess, LatinHypercubeNelderMead, Proposal, Random, SEARCH_NAMES, Search,
+    search_by_name,
 };
 pub use space::Space;
 pub use trial::{Outcome, Reason, Told, Trial, TrialId};

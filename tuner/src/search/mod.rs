@@ -4,12 +4,14 @@
 //! parameters: ranges, constraints, conditions, duplicates and failures are settled by the tuner.
 //! Every search passes [`conformance::check`](crate::conformance::check).
 
+mod gaussian_process;
 mod latin_hypercube;
 mod nelder_mead;
 mod random;
 
 use std::fmt::Debug;
 
+pub use gaussian_process::GaussianProcess;
 pub use nelder_mead::LatinHypercubeNelderMead;
 pub use random::Random;
 
@@ -66,12 +68,13 @@ pub trait Search: Debug + Send {
 }
 
 /// Names of all searches.
-pub const SEARCH_NAMES: &[&str] = &[random::NAME, nelder_mead::NAME];
+pub const SEARCH_NAMES: &[&str] = &[random::NAME, nelder_mead::NAME, gaussian_process::NAME];
 
 /// The search with this name, `None` if there is none.
 pub fn search_by_name(name: &str) -> Option<Box<dyn Search>> {
     match name {
         random::NAME => Some(Box::new(Random::new())),
+        gaussian_process::NAME => Some(Box::new(GaussianProcess::new())),
         nelder_mead::NAME => Some(Box::new(LatinHypercubeNelderMead::new())),
         _ => None,
     }
