@@ -53,6 +53,7 @@ pub mod conformance;
 mod error;
 mod param;
 mod record;
+pub mod replay;
 mod rng;
 mod search;
 mod space;

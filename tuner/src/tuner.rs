@@ -146,7 +146,7 @@ impl Tuner {
             return Err(TellError::AlreadyTold { id });
         }
         let result = match outcome {
-            Outcome::Done { cost } if cost.is_finite() && cost >= 0.0 => Some(Ok(cost)),
+            Outcome::Done { cost } if is_cost(cost) => Some(Ok(cost)),
             Outcome::Done { cost } => return Err(TellError::BadCost { id, cost }),
             Outcome::Failed { reason } => Some(Err(reason)),
             Outcome::Cancelled => None,
@@ -161,6 +161,42 @@ impl Tuner {
             .incumbent()
             .is_some_and(|best| best.canonical == canonical);
         Ok(Told { is_incumbent })
+    }
+
+    /// Ends a trial in whose place another configuration was measured: the nearest one of a recorded
+    /// table, say. The record is of that one, and the search sees where it lies.
+    ///
+    /// # Errors
+    ///
+    /// As [`Tuner::tell`].
+    ///
+    /// # Panics
+    ///
+    /// If `config` is not a configuration of the space, see [`Space::check`].
+    pub fn tell_instead(
+        &mut self,
+        id: TrialId,
+        config: &Config,
+        outcome: Outcome,
+    ) -> Result<Told, TellError> {
+        if let Err(error) = self.space.check(config) {
+            panic!("not a configuration of this space: {error}");
+        }
+        let is_usable = match outcome {
+            Outcome::Done { cost } => is_cost(cost),
+            Outcome::Failed { .. } => true,
+            Outcome::Cancelled => false,
+        };
+        if let Some(open) = self.open.get_mut(&id)
+            && is_usable
+        {
+            open.config = config.clone();
+            open.canonical = self.space.canonical(config);
+            if let Origin::Proposal { point, .. } = &mut open.origin {
+                *point = self.space.encode(config);
+            }
+        }
+        self.tell(id, outcome)
     }
 
     /// The best record by mean cost; of equal ones the older. `None` until a trial is done.
@@ -268,4 +304,9 @@ impl Tuner {
             .filter(|open| open.canonical == *canonical)
             .count()
     }
+}
+
+/// Whether a number can be a cost.
+fn is_cost(cost: f64) -> bool {
+    cost.is_finite() && cost >= 0.0
 }
