@@ -230,8 +230,9 @@ mod tests {
             b.swap(column, pivot);
             for row in column + 1..count {
                 let factor = matrix[row][column] / matrix[column][column];
-                for k in column..count {
-                    matrix[row][k] -= factor * matrix[column][k];
+                let (above, below) = matrix.split_at_mut(row);
+                for (own, other) in below[0].iter_mut().zip(&above[column]) {
+                    *own -= factor * other;
                 }
                 b[row] -= factor * b[column];
             }
