@@ -34,6 +34,8 @@ pub(super) const NAME: &str = "gaussian-process";
 const FIRST_POINTS: usize = 4;
 /// Points that are kept.
 const MOST_POINTS: usize = 100;
+/// Points that are out and count as if told, the latest.
+const MOST_OPEN: usize = 16;
 /// Random candidates in the whole cube; and near the best point.
 const FAR_CANDIDATES: usize = 96;
 const NEAR_CANDIDATES: usize = 48;
@@ -167,7 +169,8 @@ impl GaussianProcess {
                 noise: seen.noise / variance,
             })
         });
-        let open = self.open.values().filter_map(|(point, value)| {
+        let latest = self.open.values().rev().take(MOST_OPEN);
+        let open = latest.filter_map(|(point, value)| {
             Some(Known {
                 point: point.clone(),
                 value: (*value)?,
