@@ -8,7 +8,7 @@
 use raywright::{
     bvh::{BuildParams, BuildWorkspace, Ray, Work},
     tracer::{World, generate},
-    tune::ParameterSpace,
+    tune::{ParameterSpace, SpaceAxes},
     tuner::{Outcome, Tuner, search_by_name},
 };
 
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })
         .collect();
 
-    let space = ParameterSpace::new(&BuildParams::default(), &[])?;
+    let space = ParameterSpace::new(&BuildParams::default(), &[], SpaceAxes::Printed)?;
     let search = search_by_name("nelder-mead").ok_or("a search")?;
     let mut tuner = Tuner::new(space.space().clone(), search, 1);
     let mut workspace = BuildWorkspace::default();

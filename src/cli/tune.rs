@@ -23,8 +23,8 @@ use raywright::{
     },
     tracer::{Indicators, Integrator},
     tune::{
-        self, Comparison, FrameReport, Metric, ParameterSpace, Session, Settings, WallClock,
-        milliseconds,
+        self, Comparison, FrameReport, Metric, ParameterSpace, Session, Settings, SpaceAxes,
+        WallClock, milliseconds,
     },
     tuner::{SEARCH_NAMES, search_by_name},
 };
@@ -43,6 +43,23 @@ enum MetricOption {
     Total,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Space {
+    /// One for each parameter, as in the paper
+    Printed,
+    /// Only what builds different trees, near trees near to each other
+    Canonical,
+}
+
+impl From<Space> for SpaceAxes {
+    fn from(space: Space) -> Self {
+        match space {
+            Space::Printed => Self::Printed,
+            Space::Canonical => Self::Canonical,
+        }
+    }
+}
+
 /// What is tuned, and for how long.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct TuneArgs {
@@ -54,7 +71,13 @@ pub(crate) struct TuneArgs {
     /// What is made small
     #[arg(long, value_enum, default_value_t = MetricOption::Total)]
     metric: MetricOption,
-    /// The search: random or nelder-mead (from a Latin hypercube)
+    /// The axes of the search
+    #[arg(long, value_enum, default_value_t = Space::Printed)]
+    space: Space,
+    /// Try known-good parameters first: the default, spatial splits, Morton order, large leaves
+    #[arg(long)]
+    portfolio: bool,
+    /// The search: random, nelder-mead (from a Latin hypercube) or gaussian-process
     #[arg(long, default_value = "nelder-mead", value_parser = clap::builder::PossibleValuesParser::new(SEARCH_NAMES))]
     search: String,
     /// Rounds of the comparison with both baselines at the end
@@ -98,6 +121,8 @@ impl TuneArgs {
             scene: SceneOptions::built_in(scene),
             frames,
             metric: MetricOption::Total,
+            space: Space::Printed,
+            portfolio: false,
             search: "nelder-mead".into(),
             rounds: 7,
             width: 640,
@@ -121,7 +146,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<(), Failure> {
 fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     let base = args.parameters.applied_to(BuildParams::default())?;
     let stage = args.scene.prepare()?;
-    let space = ParameterSpace::new(&base, &args.parameters.names())?;
+    let space = ParameterSpace::new(&base, &args.parameters.names(), args.space.into())?;
     let settings = Settings {
         width: args.width,
         height: args.height,
@@ -147,6 +172,9 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         search,
         WallClock::start(),
     )?;
+    if args.portfolio {
+        session = session.with_starts(&tune::portfolio(&base))?;
+    }
 
     let folder = output::folder(&args.output)?;
     let file = |ending: &str| {

@@ -5,13 +5,16 @@
 //! tuner, build, render one sample per pixel, tell the tuner what it cost. The tracer does not
 //! know that a tuner exists; the tuner is told numbers and knows no rays. The clock is an argument.
 
+mod canonical;
 mod comparison;
+mod portfolio;
 mod session;
 mod space;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
+pub use portfolio::portfolio;
 pub use session::{
     Clock, FrameReport, FrameTimes, Metric, SLOWEST_TRIAL, Session, SessionError, Settings,
     TrialFailure, WallClock,
 };
-pub use space::{ParameterSpace, SpaceFault, described};
+pub use space::{ParameterSpace, SpaceAxes, SpaceFault, described};

@@ -13,7 +13,7 @@ use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, Film
 use raywright_tracer::{Integrator, Rgb, Shot, World};
 use raywright_tuner::{Outcome, Search, TellError, Tuner};
 
-use super::space::ParameterSpace;
+use super::space::{ParameterSpace, SpaceFault};
 
 /// Trials are given up after so many times the render time of the default parameters.
 pub const SLOWEST_TRIAL: u32 = 10;
@@ -283,6 +283,24 @@ impl<'a, C: Clock> Session<'a, C> {
             finished: 0,
             limit: None,
         })
+    }
+
+    /// The same run, in which some parameters are tried first, in the order given; of those that are one
+    /// configuration of its space the first.
+    ///
+    /// # Errors
+    /// If parameters are not valid.
+    pub fn with_starts(mut self, starts: &[BuildParams]) -> Result<Self, SpaceFault> {
+        let mut known = Vec::new();
+        for params in starts {
+            let config = self.space.config(params)?;
+            let canonical = self.space.space().canonical(&config);
+            if !known.contains(&canonical) {
+                known.push(canonical);
+                self.tuner = self.tuner.with_start(config);
+            }
+        }
+        Ok(self)
     }
 
     /// Asks, builds, renders, tells. The first frame is preceded by one with default parameters,

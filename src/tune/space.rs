@@ -4,6 +4,7 @@
 //! Invariant: every configuration of the space is valid; only `max_depth` can turn out too small,
 //! which depends on the scene.
 
+use super::canonical::{self, Axis};
 use raywright_bvh::{
     BuildParams, PARAMETERS, Parameter, ParameterFault, ParameterRange, ParameterValue,
 };
@@ -33,6 +34,15 @@ impl std::fmt::Display for SpaceFault {
 
 impl std::error::Error for SpaceFault {}
 
+/// The axes of a search space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpaceAxes {
+    /// One for each parameter of the table, with its range: the space of the paper and what is ours.
+    Printed,
+    /// What builds the same tree is one point, and what a builder does not read is no axis.
+    Canonical,
+}
+
 /// A search space over some of the BVH parameters; the others stay as given.
 #[derive(Clone, Debug)]
 pub struct ParameterSpace {
@@ -45,14 +55,16 @@ impl ParameterSpace {
     ///
     /// # Errors
     /// If `base` is not valid or nothing is left to search.
-    pub fn new(base: &BuildParams, fixed: &[&str]) -> Result<Self, SpaceFault> {
+    pub fn new(base: &BuildParams, fixed: &[&str], axes: SpaceAxes) -> Result<Self, SpaceFault> {
         base.validate().map_err(SpaceFault::Fixed)?;
         let searched = |name: &str| !fixed.contains(&name);
-        let params: Vec<Param> = PARAMETERS
+        let params = PARAMETERS
             .iter()
-            .filter(|p| !p.changes_hits && searched(p.name))
-            .filter_map(param_of)
-            .collect();
+            .filter(|p| !p.changes_hits && searched(p.name));
+        let params: Vec<Param> = match axes {
+            SpaceAxes::Printed => params.filter_map(param_of).collect(),
+            SpaceAxes::Canonical => params.filter_map(|p| canonical_of(p, searched)).collect(),
+        };
         let mut space = Space::new(params).map_err(SpaceFault::Space)?;
         let has = |space: &Space, name: &str| space.params().iter().any(|p| p.name == name);
         if has(&space, "min_leaf_size") && has(&space, "max_leaf_size") {
@@ -60,7 +72,7 @@ impl ParameterSpace {
                 .with_at_most("min_leaf_size", "max_leaf_size")
                 .map_err(SpaceFault::Space)?;
         }
-        if has(&space, "sah_block_size") {
+        if has(&space, "sah_block_size") && axes == SpaceAxes::Printed {
             let rule = CanonRule::FloorToPowerOfTwo("sah_block_size".into());
             space = space.with_canon(rule).map_err(SpaceFault::Space)?;
         }
@@ -80,6 +92,40 @@ impl ParameterSpace {
         &self.space
     }
 
+    /// The configuration that stands for some parameters, moved to the nearest values of the space; of
+    /// parameters that are fixed nothing is asked.
+    ///
+    /// # Errors
+    /// [`SpaceFault::Fixed`] if the parameters are not valid.
+    pub fn config(&self, params: &BuildParams) -> Result<Config, SpaceFault> {
+        params.validate().map_err(SpaceFault::Fixed)?;
+        let ratio = |a: f32, b: f32| f64::from(a) / f64::from(b);
+        let value = |param: &Param| -> f64 {
+            match param.name.as_str() {
+                "leaf_size_ratio" => {
+                    ratio(params.max_leaf_size as f32, params.min_leaf_size as f32)
+                }
+                "cost_ratio" => ratio(params.intersection_cost, params.traversal_cost),
+                name => match params.get(name) {
+                    Some(ParameterValue::Integer(value)) => f64::from(value),
+                    Some(ParameterValue::Real(value)) => f64::from(value),
+                    Some(ParameterValue::Choice(word)) => {
+                        let words = word_values(name).unwrap_or_default();
+                        words.iter().position(|own| *own == word).unwrap_or(0) as f64
+                    }
+                    None => 0.0,
+                },
+            }
+        };
+        let values: Vec<(&str, Value)> = self
+            .space
+            .params()
+            .iter()
+            .map(|param| (param.name.as_str(), param.kind.nearest(value(param))))
+            .collect();
+        self.space.config(&values).map_err(SpaceFault::Space)
+    }
+
     /// The parameters of a configuration.
     ///
     /// # Panics
@@ -87,7 +133,19 @@ impl ParameterSpace {
     #[must_use]
     pub fn params(&self, config: &Config) -> BuildParams {
         let mut params = self.base;
+        let is_searched = |name| self.space.params().iter().any(|p| p.name == name);
+        let min_leaf_size = match config.integer("min_leaf_size") {
+            Some(size) if is_searched("min_leaf_size") => size as u32,
+            _ => self.base.min_leaf_size,
+        };
         for (name, value) in config.iter() {
+            if let Some(parts) = canonical::parameters(name, value, min_leaf_size) {
+                for (name, text) in parts {
+                    let known = "the axis is made from the parameter table";
+                    params.set(name, &text).expect(known);
+                }
+                continue;
+            }
             let text = match (word_values(name), value) {
                 (Some(words), Value::Integer(index)) => words[index as usize].to_owned(),
                 (_, value) => number_text(value),
@@ -140,6 +198,27 @@ fn param_of(parameter: &Parameter) -> Option<Param> {
     })
 }
 
+/// The canonical axis of a parameter, active where a builder reads it.
+fn canonical_of(parameter: &Parameter, searched: impl Fn(&str) -> bool) -> Option<Param> {
+    let param = match canonical::axis(parameter, &searched) {
+        Some(Axis::Instead(param)) => param,
+        Some(Axis::None) => return None,
+        None => param_of(parameter)?,
+    };
+    let readers = canonical::readers(parameter.name).filter(|_| searched("quality"));
+    let words = word_values("quality").unwrap_or_default();
+    Some(match readers {
+        None => param,
+        Some(readers) => {
+            let indices = (0..).zip(words).filter(|(_, word)| readers.contains(word));
+            param.active_if(
+                "quality",
+                indices.map(|(index, _)| index).collect::<Vec<i64>>(),
+            )
+        }
+    })
+}
+
 /// Name and value of every parameter, as text.
 #[must_use]
 pub fn described(params: &BuildParams) -> Vec<(String, String)> {
@@ -156,7 +235,13 @@ mod tests {
 
     #[test]
     fn every_configuration_is_valid_and_min_is_at_most_max() {
-        let space = ParameterSpace::new(&BuildParams::default(), &[]).unwrap();
+        for axes in [SpaceAxes::Printed, SpaceAxes::Canonical] {
+            check_configurations(axes);
+        }
+    }
+
+    fn check_configurations(axes: SpaceAxes) {
+        let space = ParameterSpace::new(&BuildParams::default(), &[], axes).unwrap();
         let dimensions = space.space().dimensions();
         for i in 0..2000_u64 {
             // A Weyl sequence per axis fills the cube evenly.
@@ -170,10 +255,30 @@ mod tests {
     }
 
     #[test]
+    fn good_parameters_have_their_place_in_every_space() {
+        let mut splits = BuildParams::default();
+        splits.quality = raywright_bvh::Quality::SpatialSplits;
+        splits.max_depth = 13;
+        splits.min_leaf_size = 10;
+        for axes in [SpaceAxes::Printed, SpaceAxes::Canonical] {
+            let space = ParameterSpace::new(&BuildParams::default(), &[], axes).unwrap();
+            for params in [BuildParams::default(), splits] {
+                let found = space.params(&space.config(&params).unwrap());
+                let own = described(&params);
+                for ((name, found), (_, own)) in described(&found).iter().zip(&own) {
+                    // Of the costs only the ratio is kept.
+                    let kept = axes == SpaceAxes::Printed || !name.ends_with("_cost");
+                    assert!(!kept || found == own, "{axes:?} {name}: {found} {own}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn accuracy_is_never_searched_and_fixed_parameters_keep_their_value() {
         let mut base = BuildParams::default();
         base.branching_factor = 4;
-        let space = ParameterSpace::new(&base, &["branching_factor"]).unwrap();
+        let space = ParameterSpace::new(&base, &["branching_factor"], SpaceAxes::Printed).unwrap();
         let names: Vec<&str> = space
             .space()
             .params()

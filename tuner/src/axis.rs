@@ -99,6 +99,26 @@ impl Kind {
         }
     }
 
+    /// The value that is nearest to a number; to one that is no number the first. Of a boolean numbers from
+    /// one half on are true.
+    pub fn nearest(&self, number: f64) -> Value {
+        match *self {
+            Kind::Bool => Value::Bool(number >= 0.5),
+            // Clamped first: a cast of what remains is exact.
+            Kind::Integer { min, max, .. } => {
+                Value::Integer(number.max(min as f64).min(max as f64).round() as i64)
+            }
+            Kind::Ordinal(ref values) => {
+                let distance = |value: &i64| (*value as f64 - number).abs();
+                let nearest = values
+                    .iter()
+                    .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                Value::Integer(nearest.copied().unwrap_or_default())
+            }
+            Kind::Real { min, max, .. } => self.round(Value::Real(number.max(min).min(max))),
+        }
+    }
+
     /// The value at `unit`; numbers outside the interval are projected, NaN counts as 0.
     pub(crate) fn decode(&self, unit: f64) -> Value {
         let unit = if unit.is_nan() {
