@@ -1,4 +1,4 @@
-//! `cargo bench -p raywright-benches --bench replay [-- FOLDER]`: searches on recorded problems, judged in
+//! `cargo bench -p raywright-benches --bench replay [--features peers] [-- FOLDER]`: searches on recorded problems, judged in
 //! seconds and without one frame.
 //!
 //! Every search asks, and the nearest recorded configuration that is left answers; so no cost is that of
@@ -6,12 +6,14 @@
 //! cost of the frames so far over it, less 1: what a user would pay without probes. Geometric means over
 //! problems and seeds; beside the regret the interval in which 95 % of means over problems drawn anew lie.
 
+#[cfg(feature = "peers")]
+mod peer;
 mod problems;
 mod spaces;
 
 use std::{env, error::Error, path::PathBuf, time::Instant};
 
-use raywright_tuner::{Outcome, Tuner, replay::Pool, search_by_name};
+use raywright_tuner::{Outcome, Search, Tuner, replay::Pool, search_by_name};
 
 use problems::{Metric, Problem, problems};
 use spaces::SpaceKind;
@@ -30,7 +32,7 @@ struct Method {
     starts: &'static [&'static str],
 }
 
-const METHODS: [Method; 6] = [
+const METHODS: &[Method] = &[
     Method {
         name: "random, printed",
         space: SpaceKind::Printed,
@@ -67,7 +69,30 @@ const METHODS: [Method; 6] = [
         search: "gaussian-process",
         starts: PORTFOLIO,
     },
+    #[cfg(feature = "peers")]
+    Method {
+        name: "crate tpe, canonical",
+        space: SpaceKind::Canonical,
+        search: peer::NAME,
+        starts: &[],
+    },
+    #[cfg(feature = "peers")]
+    Method {
+        name: "3 starts + crate tpe, canonical",
+        space: SpaceKind::Canonical,
+        search: peer::NAME,
+        starts: PORTFOLIO,
+    },
 ];
+
+/// A search of the tuner or of a peer.
+fn search(name: &str) -> Option<Box<dyn Search>> {
+    #[cfg(feature = "peers")]
+    if name == peer::NAME {
+        return Some(Box::new(peer::Tpe::default()));
+    }
+    search_by_name(name)
+}
 
 /// Known-good configurations: strong default, the same with spatial splits, Morton order.
 const PORTFOLIO: &[&str] = &["strong8", "strong8hq", "morton8"];
@@ -101,7 +126,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "\n{}: regret after {TOLD:?} frames, %; excess, %",
             metric.name()
         );
-        for method in &METHODS {
+        for method in METHODS {
             let start = Instant::now();
             let scores = problems
                 .iter()
@@ -184,7 +209,7 @@ fn score(method: &Method, problem: &Problem, metric: Metric) -> Result<Score, Bo
     let mut sum = Score::default();
     for seed in 0..SEEDS {
         let mut pool = Pool::new(&space, rows.iter().cloned());
-        let search = search_by_name(method.search).ok_or("no such search")?;
+        let search = search(method.search).ok_or("no such search")?;
         let mut tuner = Tuner::new(space.clone(), search, seed);
         for name in method.starts {
             if let Some((row, _)) = problem.rows.iter().find(|(row, _)| row.name == *name) {

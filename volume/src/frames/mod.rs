@@ -10,9 +10,9 @@ mod clock;
 mod rest;
 
 use raywright_bvh::BuildWorkspace;
-use rest::Rest;
 
 pub use clock::{FrameClock, WorkTimer};
+use rest::Rest;
 
 use crate::{
     appearance::{Appearance, AppearanceError, IsoSurface},
