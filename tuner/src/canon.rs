@@ -11,6 +11,8 @@ use crate::Value;
 
 /// One redundancy of a space. Rules apply to active parameters.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "store", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum CanonRule {
     /// Of this integer or ordinal parameter, all values at least 1, only the largest power of two
@@ -41,6 +43,23 @@ pub(crate) enum ResolvedRule {
 }
 
 impl ResolvedRule {
+    /// The rule with names instead of indices.
+    #[cfg(feature = "store")]
+    pub(crate) fn with_names(&self, names: &[String]) -> CanonRule {
+        match *self {
+            ResolvedRule::FloorToPowerOfTwo(index) => {
+                CanonRule::FloorToPowerOfTwo(names[index].clone())
+            }
+            ResolvedRule::OnlyRatio {
+                numerator,
+                denominator,
+            } => CanonRule::OnlyRatio {
+                numerator: names[numerator].clone(),
+                denominator: names[denominator].clone(),
+            },
+        }
+    }
+
     /// Indices of the parameters the rule changes.
     pub(crate) fn params(&self) -> impl Iterator<Item = usize> + use<> {
         let (first, second) = match *self {

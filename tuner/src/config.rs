@@ -8,8 +8,10 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-/// The value of one parameter.
+/// The value of one parameter. As JSON: `true`, `3`, or `3.0`, which is another value than `3`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "store", serde(untagged))]
 pub enum Value {
     /// Of a boolean parameter.
     Bool(bool),

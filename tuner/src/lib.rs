@@ -3,8 +3,9 @@
 //! A [`Space`] describes parameters as data: ranges, conditions, constraints, and which
 //! configurations are known to do the same. A [`Tuner`] hands out configurations to try and is told
 //! what they cost; a [`Search`] behind it decides where to look. Several trials may be open at
-//! once. The crate knows nothing about what is tuned. It reads no clock, does no input or output
-//! and draws no randomness but from the seed it is given, so every run can be replayed.
+//! once. The crate knows nothing about what is tuned. It reads no clock and draws no randomness
+//! but from the seed it is given, so every run can be replayed. Only `store`, behind the
+//! feature of that name (default), touches files.
 //!
 //! # Example
 //!
@@ -57,6 +58,8 @@ pub mod replay;
 mod rng;
 mod search;
 mod space;
+#[cfg(feature = "store")]
+pub mod store;
 mod trial;
 mod tuner;
 

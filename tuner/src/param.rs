@@ -9,6 +9,8 @@ use crate::Value;
 
 /// How a range is spread over its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "store", serde(rename_all = "snake_case"))]
 pub enum Scale {
     /// Equal differences take equal room.
     Linear,
@@ -18,6 +20,8 @@ pub enum Scale {
 
 /// The possible values of a parameter. All bounds are inclusive.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "store", serde(rename_all = "snake_case"))]
 pub enum Kind {
     /// `false` or `true`.
     Bool,
@@ -64,6 +68,7 @@ impl fmt::Display for Kind {
 
 /// When a parameter matters: another one, described earlier, is active and has one of the values.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
 pub struct Condition {
     /// Name of the boolean, integer or ordinal parameter that decides.
     pub param: String,
@@ -73,6 +78,7 @@ pub struct Condition {
 
 /// One parameter of a space.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
 pub struct Param {
     /// Unique within the space.
     pub name: String,

@@ -290,6 +290,21 @@ impl Space {
         Config::new(self.names.clone(), values)
     }
 
+    /// The constraints: names of the lesser and the greater parameter.
+    #[cfg(feature = "store")]
+    pub(crate) fn at_most(&self) -> impl Iterator<Item = (String, String)> {
+        let name = |index: usize| self.names[index].clone();
+        self.order
+            .iter()
+            .map(move |&(low, high)| (name(low), name(high)))
+    }
+
+    /// The rules of the canonical form.
+    #[cfg(feature = "store")]
+    pub(crate) fn canon(&self) -> impl Iterator<Item = CanonRule> {
+        self.rules.iter().map(|rule| rule.with_names(&self.names))
+    }
+
     /// Widths of the narrowest bins, axis by axis; 0 for reals.
     pub(crate) fn steps(&self) -> Vec<f64> {
         self.params.iter().map(|param| param.kind.step()).collect()

@@ -66,6 +66,8 @@ impl fmt::Display for Reason {
 
 /// How a trial ended.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "store", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "store", serde(rename_all = "snake_case"))]
 pub enum Outcome {
     /// It was measured.
     Done {
