@@ -95,11 +95,8 @@ pub(super) fn parameters(
     match axis {
         "leaf_size_ratio" => {
             let size = (f64::from(min_leaf_size) * ratio).round() as u32;
-            let most = 64;
-            Some(vec![(
-                "max_leaf_size",
-                size.clamp(min_leaf_size, most).to_string(),
-            )])
+            let size = size.min(MOST_LEAF).max(min_leaf_size);
+            Some(vec![("max_leaf_size", size.to_string())])
         }
         "cost_ratio" => Some(vec![
             ("traversal_cost", "1".to_owned()),
