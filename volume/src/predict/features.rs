@@ -39,12 +39,13 @@ pub struct FeatureScales {
 }
 
 impl Default for FeatureScales {
-    /// Over the scripted sequences of eight volumes (192², 10 frames a second, step 0.75, by the work
-    /// clock with 2 % of noise; example `predict_sequence`, 2026) times are off by 6.8 % root mean
-    /// square, and by 14 % in frames whose transfer function is new. With all halved: 6.8 and 16 %;
-    /// all doubled: 7.5 and 14 %; without the seen share 7.1 and 22 %; without any other one 6.6 to
-    /// 7.0 and 12 to 15 %, save the step: where it changes, 14 instead of 7.1 %. In raw units: 21 and
-    /// 46 %. By the wall clock of a busy machine voxel size and lit share are worth more.
+    /// Over the scripted sequences of three volumes (stent, chest, head; 128², 10 frames a second, by a work
+    /// clock with 2 % of noise and costs that the predictor does not know; example `predict_sequence`,
+    /// 2026) times are off by 6.0 % root mean square at a step of 0.75, by 6.9 % where steps jump between
+    /// 0.5 and 2. Without one feature: coarse steps 7.7 and 8.3 %, seen share 6.3 and 7.5, lit share 6.5 and
+    /// 7.1, termination 6.3 and 7.2, voxel size 6.7 and 6.8, direction 6.1 and 6.9, step 6.0 and 10.9. All
+    /// halved 7.0 and 7.4 %, all doubled 6.8 and 9.4. A running mean of costs in place of the kernel model:
+    /// 16.1 and 18.0 %.
     fn default() -> Self {
         Self {
             direction: 15.0,

@@ -38,7 +38,7 @@ const MAX_SPEED: f64 = 2.0;
 /// Limit of the logarithm of a cost's ratio to that of the first frame. Where all work is weighed it is
 /// a few at most, and more is an odd frame.
 const MAX_LOG_COST: f64 = 20.0;
-const MAX_LOG_WEIGHTED: f64 = 1.6;
+const MAX_LOG_WEIGHTED: f64 = 2.5;
 
 /// Units of costs for the kernel model, seconds: numbers near 1.
 const COST_UNIT: f64 = 1e-9;
