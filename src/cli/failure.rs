@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+/// A check that was asked for found something.
+const CHECK_FAILED: u8 = 1;
 /// Bad input or usage.
 const BAD_INPUT: u8 = 2;
 /// Stopped by the user.
@@ -17,6 +19,8 @@ pub(crate) enum Failure {
         /// What the user may try.
         hint: Option<String>,
     },
+    /// A check found something, as the command has said.
+    Check,
     /// The user interrupted; what was done is kept, as the command has said.
     Interrupted,
 }
@@ -43,6 +47,7 @@ impl Failure {
                 }
                 ExitCode::from(BAD_INPUT)
             }
+            Self::Check => ExitCode::from(CHECK_FAILED),
             Self::Interrupted => ExitCode::from(INTERRUPTED),
         }
     }

@@ -8,6 +8,7 @@ mod render;
 mod rows;
 mod run_options;
 mod scene;
+mod store;
 mod tune;
 mod volume;
 
@@ -41,6 +42,9 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
     Demo(demo::DemoArgs),
+    /// What tuning left in a folder of logs: look, check, merge, export
+    #[command(subcommand)]
+    Store(store::StoreCommand),
     /// Volumes: what is in a file, and pictures of it
     #[command(subcommand)]
     Volume(volume::VolumeCommand),
@@ -53,6 +57,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), Failure> {
         Command::Tune(args) => tune::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
+        Command::Store(command) => store::run(&command),
         Command::Volume(command) => volume::run(&command),
     }
 }

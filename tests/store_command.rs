@@ -1,0 +1,104 @@
+//! `raywright store` on a store that a program left behind.
+
+#![cfg(feature = "cli")]
+
+use std::{fs, path::Path, process::Command};
+
+use raywright::tuner::{
+    Outcome, Param, Space, Value,
+    store::{
+        Fact, Facts, Machine, Scene, SpaceFacts, Store, SyncPolicy, TrialOpen, TrialOutcome,
+        WriterId,
+    },
+};
+
+/// Exit code and what was printed.
+fn store(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
+        .arg("store")
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    (output.status.code(), text)
+}
+
+/// Two outcomes by a writer; the path of its log.
+fn fill(folder: &Path, writer: &str) -> std::path::PathBuf {
+    let space = Space::new(vec![Param::boolean("steam", "Whether water is thrown in.")]).unwrap();
+    let described = SpaceFacts::new(&space);
+    let machine = Machine::new(Facts::from([("maker".to_owned(), Fact::from("Hearth"))]));
+    let scene = Scene::new(Facts::from([("rye".to_owned(), Fact::from(0.3))]));
+    let store = Store::open(folder).unwrap();
+    let id = WriterId::new(writer).unwrap();
+    let mut log = store.writer(&id, SyncPolicy::OnClose).unwrap();
+    log.append(1.0, described.clone()).unwrap();
+    log.append(1.0, machine.clone()).unwrap();
+    log.append(1.0, scene.clone()).unwrap();
+    for steam in [true, false] {
+        let config = space.config(&[("steam", Value::Bool(steam))]).unwrap();
+        let (space, scene) = (described.id.clone(), scene.id.clone());
+        let open = TrialOpen::new(space, machine.id.clone(), scene, &config, "start");
+        let trial = log.append(2.0, open).unwrap();
+        let cost = if steam { 1.5 } else { 2.5 };
+        let outcome = TrialOutcome::new(trial, Outcome::Done { cost });
+        log.append(3.0, outcome).unwrap();
+    }
+    let path = log.path().to_owned();
+    log.close().unwrap();
+    path
+}
+
+#[test]
+fn a_store_is_listed_checked_merged_and_exported() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = fill(&folder.path().join("a"), "first");
+    fill(&folder.path().join("b"), "second");
+    let at = |args: &[&str]| store(folder.path(), args);
+
+    let (code, text) = at(&["list", "a"]);
+    assert_eq!(code, Some(0));
+    assert!(
+        text.contains("2 done, 0 failed, 0 cancelled, 0 open"),
+        "{text}"
+    );
+    assert_eq!(at(&["fsck", "a"]).0, Some(0));
+
+    assert_eq!(at(&["merge", "all", "a", "b"]).0, Some(0));
+    assert_eq!(at(&["merge", "all", "b", "a"]).0, Some(0));
+    let (_, text) = at(&["list", "all"]);
+    assert!(
+        text.contains("2 files") && text.contains("4 done"),
+        "{text}"
+    );
+    let (code, table) = at(&["export", "all"]);
+    assert_eq!((code, table.lines().count()), (Some(0), 1 + 4), "{table}");
+    assert!(table.contains("2.5"), "{table}");
+    let (_, lines) = at(&["export", "all", "--format", "json"]);
+    assert_eq!(lines.lines().count(), 14);
+
+    // One byte in the middle: the rest is still there.
+    let mut bytes = fs::read(&log).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x20;
+    fs::write(&log, bytes).unwrap();
+    let (code, text) = at(&["fsck", "a"]);
+    assert_eq!(code, Some(1));
+    assert!(text.contains("damaged"), "{text}");
+    assert_eq!(at(&["compact", "a"]).0, Some(0));
+    assert_eq!(at(&["fsck", "a"]).0, Some(0));
+}
+
+#[test]
+fn what_is_no_store_is_refused_and_not_made() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["list", "fsck", "compact", "export"] {
+        assert_eq!(store(folder.path(), &[command, "missing"]).0, Some(2));
+    }
+    assert_eq!(
+        store(folder.path(), &["merge", "new", "missing"]).0,
+        Some(2)
+    );
+    assert!(!folder.path().join("missing").exists() && !folder.path().join("new").exists());
+}
