@@ -328,16 +328,16 @@ fn goals(clock: ClockName, all: &[OfVolume]) -> Vec<String> {
     sentences
 }
 
-/// The order of the ways in Table 1 of the paper, in ours with its caster, and whether it is the same:
-/// times above the target fall from last frame over prediction to two pass; and two pass has the
-/// longest steps.
+/// The order of the ways in Table 1 of the paper, in ours with its caster, and whether it is the same: times
+/// above the target are larger by the last frame than by prediction; two pass has hardly a slow frame, and
+/// the longest steps. (Its root mean square above the target is that of one or two frames, there as here.)
 fn order(all: &[OfVolume]) -> (String, bool) {
     let of = |volumes: &[OfVolume], way| summary(volumes.iter(), Caster::Hull, way);
     let holds = |volumes: &[OfVolume]| {
         let [last, paper, two] =
             [Way::LastFrame, Way::Paper, Way::TwoPass].map(|way| of(volumes, way));
         last.rmse_up > paper.rmse_up
-            && paper.rmse_up > two.rmse_up
+            && two.slow < 0.1 * last.slow.min(paper.slow)
             && two.mean_step > 1.2 * last.mean_step.max(paper.mean_step)
     };
     let own = all
@@ -347,16 +347,17 @@ fn order(all: &[OfVolume]) -> (String, bool) {
     let columns = [Way::LastFrame, Way::Paper, Way::TwoPass].map(|way| {
         let s = of(all, way);
         format!(
-            "{} {:.1} % at step {:.2}",
+            "{} {:.1} %, {:.1} % slow, step {:.2}",
             way.name(),
             100.0 * s.rmse_up,
+            100.0 * s.slow,
             s.mean_step
         )
     });
     let together = holds(all);
     let sentence = format!(
-        "order of Table 1 (RMSE above the target falls, two pass has the longest steps): {}: {}, and on {own} of {} volumes by themselves",
-        columns.join(", "),
+        "order of Table 1 (RMSE above the target, slow frames, step): {}: {}, and on {own} of {} volumes by themselves",
+        columns.join("; "),
         if together { "the same" } else { "missed" },
         all.len()
     );
