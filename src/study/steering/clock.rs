@@ -4,8 +4,10 @@ use std::time::Instant;
 
 use crate::volume::{FrameClock, Work, WorkClock, WorkTimer, predict::WorkCosts};
 
-/// What parts of a frame cost by the work clock: about what they do on one core of 2024 with AVX-512
-/// (fitted to frames by the wall clock), which is not what predictors begin with.
+/// What parts of a frame cost by the work clock: within what was fitted to frames of two volumes by the wall
+/// clock on one core of 2024 with AVX-512. The fits differ much (a sample 2.4 to 8.5 ns, what is seen of it
+/// 0 to 3.7 ns more), and how well a model with one cost per sample does depends on that share. It is not
+/// what predictors begin with.
 pub const CLOCK_COSTS: WorkCosts = WorkCosts {
     ray: 20e-9,
     skip: 8e-9,
