@@ -304,6 +304,9 @@ fn goals(clock: ClockName, all: &[OfVolume]) -> Vec<String> {
                 of(v, Way::Parts).mean_step / of(v, Way::TwoPass).mean_step
             });
             goal("ours, prediction", 0.07, &|v| of(v, Way::Ours).prediction);
+            goal("in parts, prediction", 0.07, &|v| {
+                of(v, Way::Parts).prediction
+            });
         }
         ClockName::Wall => {
             goal("in parts, 95th percentile", 1.05, &|v| {
