@@ -1,5 +1,9 @@
 //! Every kernel against testing every triangle: the same bits, for every accuracy, branching factor,
 //! leaf format and instruction set, any parameters, any rays.
+//!
+//! Where triangles are cut, only hits that exact arithmetic knows are promised: the parts cover the
+//! triangle and not its box, so that a ray in the plane of a triangle can be accepted by the test,
+//! at any place of the triangle's box, and enter none of the parts.
 
 use proptest::prelude::*;
 use raywright_bvh::{
@@ -7,7 +11,9 @@ use raywright_bvh::{
     reference,
 };
 
-type Bits = Option<(u32, u32, u32, u32, u32)>;
+/// Distance, weights, geometry, primitive.
+type HitBits = (u32, u32, u32, u32, u32);
+type Bits = Option<HitBits>;
 
 fn bits(hit: Option<Hit>) -> Bits {
     hit.map(|h| {
@@ -68,12 +74,55 @@ fn check(
             hits += usize::from(expected.is_some());
             for tree in &trees {
                 let context = format!("{} {:?} {ray:?}", tree.isa(), tree.params());
-                prop_assert_eq!(bits(tree.closest_hit(ray)), expected, "{}", context);
-                prop_assert_eq!(tree.any_hit(ray), expected.is_some(), "{}", context);
+                let got = bits(tree.closest_hit(ray));
+                let any = tree.any_hit(ray);
+                if let (true, Some(expected)) = (cuts(params.quality), expected)
+                    && (got != Some(expected) || !any)
+                    && is_noise(meshes, ray, expected)
+                {
+                    let order = |(t, _, _, geometry, primitive)| (t, geometry, primitive);
+                    let behind = got.is_none_or(|got| order(got) >= order(expected));
+                    prop_assert!(behind, "{got:?} precedes {expected:?}: {context}");
+                    continue;
+                }
+                prop_assert_eq!(got, expected, "{}", context);
+                prop_assert_eq!(any, expected.is_some(), "{}", context);
             }
         }
     }
     Ok(hits)
+}
+
+/// Whether triangles may be cut.
+fn cuts(quality: Quality) -> bool {
+    matches!(quality, Quality::SpatialSplits | Quality::Optimized)
+}
+
+/// Whether a hit is owed to rounding: by the formulas of `triangle` in f64, from the same vertices,
+/// the ray passes the triangle by, or meets it at a distance that is off by more than the padding
+/// of boxes allows for.
+fn is_noise(meshes: &[&TriangleMesh], ray: &Ray, (t, _, _, geometry, primitive): HitBits) -> bool {
+    let [a, b, c] = meshes[geometry as usize]
+        .corners(primitive)
+        .map(|v| v.as_dvec3());
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let (edge_1, edge_2) = (b - a, c - a);
+    let p = direction.cross(edge_2);
+    let den = p.dot(edge_1);
+    let q = (origin - a).cross(edge_1);
+    let u = p.dot(origin - a) / den;
+    let v = q.dot(direction) / den;
+    let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+    let largest = meshes
+        .iter()
+        .flat_map(|mesh| mesh.vertices())
+        .map(|v| v.abs().max_element())
+        .fold(0.0, f32::max);
+    // Two roundoffs of the margin m·|r| on its tightest axis.
+    let margin = (ray.origin.abs().as_dvec3() + f64::from(largest)) / direction.abs();
+    let allowed = margin.min_element() / f64::from(1 << 23);
+    let distance = q.dot(edge_2) / den;
+    !(inside && (distance - f64::from(f32::from_bits(t))).abs() <= allowed)
 }
 
 fn vector(range: f32) -> impl Strategy<Value = Vec3> {

@@ -17,6 +17,11 @@
 //! 4.1·u·m·|r|. So a box that is padded by 7.1·u·m·|r| more than the triangle's own, and encloses
 //! it, contains its interval; the difference of [`NODE_PAD`] and [`TRIANGLE_PAD`] is 16u. (`fast`
 //! adds what its planes are off by, `robust` has a larger margin than m·|r|.)
+//!
+//! Where the builder cuts triangles (spatial splits) the parts' boxes cover the triangle and not its
+//! box. Then the argument holds for hits whose point is in the triangle and whose distance is right
+//! to about 2·u·m·|r|; a ray in the plane of a triangle, for which all that the test computes is
+//! noise, can be accepted by the test and enter none of the parts.
 
 use super::kernel::RaySetup;
 use crate::{layout::block::Point, simd::Lanes};
