@@ -3,13 +3,14 @@
 //! `cargo run --release -p raywright-volume --example predict_sequence -- VOLUME [SIDE] [FPS]`
 //!
 //! Every frame is drawn once, at steps that jump about, and its work and time are kept; then each
-//! predictor is led through the same frames, by the work clock and by the wall. Printed: root mean
+//! predictor is led through the same frames, by the work clock and by the processor time of all threads. Printed: root mean
 //! square and median of the relative error after the first ten frames, root mean square in frames
 //! whose transfer function is new, and the share of frames that took more than 1.2 times what was
 //! predicted, in percent; and vectors in the dictionary.
 
-use std::{env, error::Error, path::PathBuf, time::Instant};
+use std::{env, error::Error, path::PathBuf};
 
+use cpu_time::ProcessTime;
 use raywright_volume::{
     CastOptions, EstimateMethod, Estimator, FramePredictor, LoadOptions, Outlook, PredictorParams,
     Quality, Raycaster, View, Work, WorkClock, load_volume,
@@ -21,7 +22,7 @@ struct Frame {
     outlook: Outlook,
     quality: Quality,
     work: Work,
-    wall: f64,
+    processor: f64,
     switched: bool,
 }
 
@@ -37,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         sequence.fps = fps;
         let frames = record(&volume, &sequence, side, [shortest, longest])?;
         println!("{}, {steps}, {} frames", path.display(), frames.len());
-        println!("{:40} {:^31}   {:^31}", "", "work clock", "wall");
+        println!("{:40} {:^31}   {:^31}", "", "work clock", "processor time");
         for (name, params) in predictors() {
             // Not what predictors begin with.
             let costs = WorkCosts {
@@ -51,8 +52,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let work = run(params, &frames, |index, frame| {
                 clock.time(&frame.work, index)
             })?;
-            let wall = run(params, &frames, |_, frame| frame.wall)?;
-            println!("{name:40} {work}   {wall}");
+            let processor = run(params, &frames, |_, frame| frame.processor)?;
+            println!("{name:40} {work}   {processor}");
         }
     }
     Ok(())
@@ -80,12 +81,12 @@ fn record(
             let prepared = estimator.prepare(&moment.function, EstimateMethod::MeanExtinction);
             let estimate = prepared.estimate(moment.camera, size, &options, index as u32)?;
             let prepared = caster.prepare(&moment.function);
-            let mut wall = f64::INFINITY;
+            let mut processor = f64::INFINITY;
             let mut work = Work::default();
             for _ in 0..2 {
-                let start = Instant::now();
+                let start = ProcessTime::now();
                 work = prepared.render(moment.camera, size, &options)?.work;
-                wall = wall.min(start.elapsed().as_secs_f64());
+                processor = processor.min(start.elapsed().as_secs_f64());
             }
             let switched = moment.function_key != last_key;
             last_key = moment.function_key;
@@ -93,7 +94,7 @@ fn record(
                 outlook: Outlook::new(&estimate, volume, &moment.camera, size, options.step),
                 quality: Quality::with_step(step),
                 work,
-                wall,
+                processor,
                 switched,
             })
         })

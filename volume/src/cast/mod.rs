@@ -9,6 +9,7 @@ mod field;
 mod kernel;
 mod lanes;
 mod options;
+mod partly;
 mod picture;
 pub(crate) mod reference;
 mod space;
@@ -17,7 +18,7 @@ mod tiles;
 pub(crate) mod view;
 
 use raywright_bvh::{BuildWorkspace, TreeStats};
-use raywright_imaging::{AnyCamera, Camera, Image, PictureFrame};
+use raywright_imaging::{AnyCamera, Image, PictureFrame};
 
 use crate::{
     appearance::{Appearance, AppearanceError, Integration, IsoSurface},
@@ -35,8 +36,8 @@ pub use options::{Behind, CastError, CastOptions, Counts, Jitter, Skipping};
 pub use picture::{Picture, RayWork, Work};
 use sparse::Chosen;
 pub use sparse::PixelsPerRay;
+use tiles::cast_tiles;
 pub use tiles::parts;
-use tiles::{cast_bands, cast_tiles};
 use view::View;
 
 /// Binary logarithm of the cells along the edge of a block.
@@ -203,6 +204,14 @@ fn check_size(dims: [usize; 3], voxels: usize) -> Result<(), CastError> {
     }
 }
 
+/// An appearance by steps of one length.
+struct Tables<'a> {
+    step: f32,
+    transfer: TransferTable<'a>,
+    /// What is more than a transfer function.
+    details: Option<Details>,
+}
+
 /// A volume as a transfer function shows it.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
@@ -291,71 +300,6 @@ impl Prepared<'_> {
         })
     }
 
-    /// The same picture part by part, with a step for each: before each part `step` is asked, which is
-    /// told the number of the part and the work of those before. [`parts`] says which rows they have.
-    /// Numbers of samples in [`Picture::end`] are those of the part. Where pixels share rays, those of
-    /// silhouettes between them come last, with the step of the last part.
-    ///
-    /// # Errors
-    /// As [`Prepared::render`].
-    pub fn render_in_parts(
-        &self,
-        camera: impl Into<AnyCamera>,
-        size: [u32; 2],
-        options: &CastOptions,
-        mut step: impl FnMut(usize, &Work) -> f32,
-    ) -> Result<Picture, CastError> {
-        let rays = camera.into().picture_frame(size[0], size[1])?;
-        let mut picture = blank(size, options)?;
-        let mut options = *options;
-        let mut work = Work::default();
-        let lattice = options.pixels_per_ray;
-        for (part, bands) in tiles::bands_of_parts(&mut picture).into_iter().enumerate() {
-            options.step = step(part, &work);
-            work.add(&self.with_frame(&rays, &options, |frame| {
-                cast_bands(frame, size[0], bands, Chosen::Lattice(lattice), options.isa)
-            })?);
-        }
-        picture.work = work;
-        if lattice != PixelsPerRay::One {
-            self.with_frame(&rays, &options, |frame| {
-                complete(&mut picture, lattice, |picture, chosen| {
-                    cast_tiles(frame, picture, chosen, options.isa);
-                });
-            })?;
-        }
-        Ok(picture)
-    }
-
-    /// A picture of which nothing is there yet, for [`Prepared::render_rows`].
-    pub(crate) fn blank(
-        &self,
-        camera: Camera,
-        size: [u32; 2],
-        options: &CastOptions,
-    ) -> Result<Picture, CastError> {
-        self.picture(camera.into(), size, options, |_, _, _| {})
-    }
-
-    /// Casts the next few rows of a picture, from `row` on; returns the row behind them.
-    pub(crate) fn render_rows(
-        &self,
-        camera: Camera,
-        options: &CastOptions,
-        picture: &mut Picture,
-        row: u32,
-    ) -> Result<u32, CastError> {
-        let size = [picture.image.width(), picture.image.height()];
-        let rays = AnyCamera::from(camera).picture_frame(size[0], size[1])?;
-        let (bands, end) = tiles::bands_from(picture, row);
-        let work = self.with_frame(&rays, options, |frame| {
-            let all = Chosen::Lattice(PixelsPerRay::One);
-            cast_bands(frame, size[0], bands, all, options.isa)
-        })?;
-        picture.work.add(&work);
-        Ok(end)
-    }
-
     fn picture(
         &self,
         camera: AnyCamera,
@@ -384,15 +328,36 @@ impl Prepared<'_> {
         then: impl FnOnce(&Frame<'_>) -> R,
     ) -> Result<R, CastError> {
         options.check()?;
+        self.with_tables(rays, options, &self.tables(options.step), then)
+    }
+
+    /// What the appearance is by steps of `step` > 0 lengths of a voxel.
+    fn tables(&self, step: f32) -> Tables<'_> {
+        let volume = self.caster.volume;
+        let (appearance, surfaces) = (&self.appearance, &self.surfaces);
+        Tables {
+            step,
+            transfer: self.baked.table(step),
+            details: (!appearance.is_plain())
+                .then(|| Details::new(appearance, surfaces, &self.baked, volume, step)),
+        }
+    }
+
+    /// Does something with what all rays of a picture read, by the tables of the step of `options`, which
+    /// have been checked.
+    fn with_tables<R>(
+        &self,
+        rays: &PictureFrame,
+        options: &CastOptions,
+        tables: &Tables<'_>,
+        then: impl FnOnce(&Frame<'_>) -> R,
+    ) -> Result<R, CastError> {
         let Raycaster { volume, layout, .. } = self.caster;
         let clip = options.clip.as_ref();
         let view = View::new(volume, rays, options.step, clip, options.jitter)?;
-        let is_plain = self.appearance.is_plain();
-        let (appearance, surfaces) = (&self.appearance, &self.surfaces);
-        let details = (!is_plain)
-            .then(|| Details::new(appearance, surfaces, &self.baked, volume, options.step));
+        let details = tables.details.as_ref();
         // Between two samples beside a missing value anything might be.
-        let needs_front = details.as_ref().is_some_and(Details::needs_front);
+        let needs_front = details.is_some_and(Details::needs_front);
         let skipping = if needs_front && volume.missing() > 0 {
             Skipping::None
         } else {
@@ -402,7 +367,7 @@ impl Prepared<'_> {
             volume,
             layout,
             view,
-            table: &self.baked.table(options.step),
+            table: &tables.transfer,
             termination: options.termination,
             behind: options.behind,
             distances: match skipping {
@@ -415,7 +380,7 @@ impl Prepared<'_> {
                 _ => None,
             },
             counts: options.counts,
-            details: details.as_ref(),
+            details,
         }))
     }
 }

@@ -28,17 +28,6 @@ impl Work {
         self.skips += other.skips;
         self.packet_steps += other.packet_steps;
     }
-
-    /// What it took since it was `before`.
-    pub(crate) fn since(&self, before: &Self) -> Self {
-        Self {
-            rays: self.rays - before.rays,
-            samples: self.samples - before.samples,
-            lit_samples: self.lit_samples - before.lit_samples,
-            skips: self.skips - before.skips,
-            packet_steps: self.packet_steps - before.packet_steps,
-        }
-    }
 }
 
 /// What one ray took.

@@ -53,6 +53,12 @@ pub(crate) struct Band<'p> {
     ray_work: &'p mut [RayWork],
 }
 
+impl Band<'_> {
+    pub(crate) fn first_row(&self) -> u32 {
+        self.rows.start
+    }
+}
+
 /// A picture in bands of so many rows.
 fn bands(picture: &mut Picture, rows: u32) -> Vec<Band<'_>> {
     let (width, height) = (picture.image.width(), picture.image.height());
@@ -86,14 +92,11 @@ pub(crate) fn bands_of_parts(picture: &mut Picture) -> Vec<Vec<Band<'_>>> {
     of_parts
 }
 
-/// The next few bands of a picture from a row on, one for each thread, and the row behind them.
-pub(crate) fn bands_from(picture: &mut Picture, row: u32) -> (Vec<Band<'_>>, u32) {
-    let height = picture.image.height();
+/// The bands of a picture from a row on.
+pub(crate) fn bands_from(picture: &mut Picture, row: u32) -> Vec<Band<'_>> {
     let mut own = bands(picture, PIECE_ROWS);
     own.retain(|band| band.rows.start >= row);
-    own.truncate(rayon::current_num_threads());
-    let end = own.last().map_or(height, |band| band.rows.end);
-    (own, end)
+    own
 }
 
 /// Casts the rays of the chosen pixels of a picture by lanes, and adds what they took.

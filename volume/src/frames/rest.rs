@@ -60,7 +60,7 @@ impl Rest {
     pub(super) fn advance(
         &mut self,
         prepared: &Prepared<'_>,
-        mut go_on: impl FnMut(&Work) -> bool,
+        go_on: impl FnMut(&Work) -> bool,
     ) -> Result<Option<(Picture, f64)>, CastError> {
         if self.is_done() {
             return Ok(None);
@@ -70,17 +70,14 @@ impl Rest {
             step: step as f32,
             ..self.options
         };
-        let (mut picture, mut row) = match self.next.take() {
+        let (mut picture, row) = match self.next.take() {
             Some(next) => next,
             None => (prepared.blank(self.camera, self.size, &options)?, 0),
         };
-        let before = picture.work;
-        while row < self.size[1] {
-            if !go_on(&picture.work.since(&before)) {
-                self.next = Some((picture, row));
-                return Ok(None);
-            }
-            row = prepared.render_rows(self.camera, &options, &mut picture, row)?;
+        let end = prepared.render_rows(self.camera, &options, &mut picture, row, go_on)?;
+        if end < self.size[1] {
+            self.next = Some((picture, end));
+            return Ok(None);
         }
         self.step = step;
         Ok(Some((picture, step)))
