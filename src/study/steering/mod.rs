@@ -34,7 +34,9 @@ pub struct FrameRow {
     pub frame_time: f64,
     /// Seconds of what is shown.
     pub cast_time: f64,
-    /// Seconds of everything but casting.
+    /// Seconds of finding what can be seen.
+    pub preparing: f64,
+    /// Seconds that prediction takes.
     pub overhead: f64,
     /// Predicted for what is shown, seconds.
     pub predicted: f64,
@@ -72,6 +74,7 @@ impl FrameRow {
             step_spread: spread[1] / spread[0],
             frame_time: drawn.frame_time,
             cast_time: drawn.cast_time,
+            preparing: drawn.preparing,
             overhead: drawn.overhead,
             predicted: predicted.time,
             samples,

@@ -38,8 +38,8 @@ pub struct Summary {
     pub samples: f64,
     /// The same of predicted ÷ true cost of an estimated sample.
     pub cost: f64,
-    /// Median of the time of everything but casting.
-    pub overhead: f64,
+    /// Percentiles 50, 95, 99 of the time that prediction takes, over target.
+    pub overhead: [f64; 3],
 }
 
 /// Frames that predictors may begin with.
@@ -118,7 +118,7 @@ impl Summary {
             prediction: root_mean_square(&ratios[0]),
             samples: root_mean_square(&ratios[1]) * ratios[1].len() as f64 / mean_samples,
             cost: root_mean_square(&ratios[2]),
-            overhead: at(&overheads, 0.5),
+            overhead: [0.5, 0.95, 0.99].map(|p| at(&overheads, p)),
         }
     }
 }
@@ -142,6 +142,7 @@ mod tests {
             step_spread: 1.0,
             frame_time,
             cast_time: frame_time,
+            preparing: 0.0,
             overhead: 0.0,
             predicted,
             samples: 5.0,

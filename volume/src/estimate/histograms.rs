@@ -34,6 +34,8 @@ const MOST_OPACITY: f64 = 0.9999;
 #[derive(Clone, Debug)]
 pub(crate) struct Histograms {
     counts: Vec<[u16; VALUE_BINS]>,
+    /// How many values each block has.
+    totals: Vec<u32>,
     /// The values between which the bins lie.
     range: [f64; 2],
 }
@@ -51,7 +53,9 @@ impl Histograms {
             VoxelSlice::U16(values) => count(values, volume.dims(), dims, shift, raw_range),
             VoxelSlice::F32(values) => count(values, volume.dims(), dims, shift, raw_range),
         };
+        let total = |counts: &[u16; VALUE_BINS]| counts.iter().copied().map(u32::from).sum();
         Self {
+            totals: counts.iter().map(total).collect(),
             counts,
             range: raw_range.map(|raw| f64::from(volume.value_of(raw))),
         }
@@ -105,18 +109,21 @@ impl Histograms {
 
     /// The mean over the voxels of each block of what their bins have.
     fn means(&self, of_bin: &[f64; VALUE_BINS]) -> Vec<f32> {
-        let mean = |values: &[u16; VALUE_BINS]| {
-            let pairs = values.iter().zip(of_bin);
-            let (sum, total) = pairs.fold((0.0, 0.0), |(sum, total), (&n, value)| {
-                (sum + f64::from(n) * value, total + f64::from(n))
-            });
-            if total > 0.0 {
-                (sum / total) as f32
-            } else {
-                0.0
+        let mean = |(values, &total): (&[u16; VALUE_BINS], &u32)| {
+            if total == 0 {
+                return 0.0;
             }
+            // Sums beside each other: additions of one would wait for each other.
+            let mut sums = [0.0; 8];
+            let eights = values.chunks_exact(8).zip(of_bin.chunks_exact(8));
+            for (counts, means) in eights {
+                for ((sum, &n), mean) in sums.iter_mut().zip(counts).zip(means) {
+                    *sum += f64::from(n) * mean;
+                }
+            }
+            (sums.iter().sum::<f64>() / f64::from(total)) as f32
         };
-        self.counts.iter().map(mean).collect()
+        self.counts.iter().zip(&self.totals).map(mean).collect()
     }
 }
 

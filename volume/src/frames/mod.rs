@@ -111,7 +111,9 @@ pub struct Drawn {
     pub frame_time: f64,
     /// Seconds of what is shown alone.
     pub cast_time: f64,
-    /// Seconds of everything but casting: preparing, estimating, predicting, choosing, learning.
+    /// Seconds of finding what can be seen, where it is not what it was in the last frame.
+    pub preparing: f64,
+    /// Seconds that prediction takes: estimating, features, predicting, choosing, learning.
     pub overhead: f64,
     /// What was predicted for what is shown, at the quality that it got in the end.
     pub prediction: Prediction,
@@ -216,19 +218,22 @@ impl<'a> FrameLoop<'a> {
             .shown
             .take()
             .filter(|shown| shown.appearance == appearance);
+        let mut preparing = 0.0;
         let shown = match kept {
             Some(shown) => shown,
             None => {
-                let Self {
-                    caster, estimator, ..
-                } = *self;
-                Shown::new(
-                    caster,
-                    estimator,
-                    &self.params,
-                    &mut self.workspace,
+                let prepared =
+                    prepare(self.caster, &self.params, &mut self.workspace, &appearance)?;
+                preparing = clock.overhead();
+                // It knows nothing of surfaces: what they change is learned.
+                let estimate = self
+                    .estimator
+                    .prepare(&appearance.function, self.params.method);
+                Shown {
                     appearance,
-                )?
+                    prepared,
+                    estimate,
+                }
             }
         };
         let shown = &*self.shown.insert(shown);
@@ -239,7 +244,7 @@ impl<'a> FrameLoop<'a> {
         let left = (target - clock.overhead()).max(LEAST_SHARE * target);
         self.steering.set_target(left)?;
         let mut pass = self.steering.begin(&self.predictor.frame(&outlook));
-        let mut overhead = clock.overhead();
+        let mut overhead = clock.overhead() - preparing;
         let mut spent = 0.0;
         loop {
             options.step = pass.quality.step as f32;
@@ -290,8 +295,9 @@ impl<'a> FrameLoop<'a> {
                         picture,
                         quality,
                         steps,
-                        frame_time: overhead + frame_time,
+                        frame_time: preparing + overhead + frame_time,
                         cast_time: time,
+                        preparing,
                         overhead,
                         prediction,
                         estimated_samples,
@@ -364,23 +370,6 @@ fn inside(
         limits,
         shares,
     )))
-}
-
-impl<'a> Shown<'a> {
-    /// What an appearance needs. An estimate knows nothing of surfaces: what they change is learned.
-    fn new(
-        caster: &'a Raycaster<'a>,
-        estimator: &'a Estimator<'a>,
-        params: &FrameLoopParams,
-        workspace: &mut BuildWorkspace,
-        appearance: Appearance,
-    ) -> Result<Self, FrameError> {
-        Ok(Self {
-            prepared: prepare(caster, params, workspace, &appearance)?,
-            estimate: estimator.prepare(&appearance.function, params.method),
-            appearance,
-        })
-    }
 }
 
 /// What is to be seen at a moment: its surfaces are white and opaque.
