@@ -102,3 +102,45 @@ fn what_is_no_store_is_refused_and_not_made() {
     );
     assert!(!folder.path().join("missing").exists() && !folder.path().join("new").exists());
 }
+
+/// A short run of `tune`, which must succeed; what it says on standard error.
+fn tune(folder: &Path, args: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
+        .args(["tune", "interior", "--frames", "4", "--rounds", "1"])
+        .args(["--width", "48", "--height", "27", "--store", "memory"])
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{errors}");
+    errors
+}
+
+#[test]
+fn a_run_goes_on_from_what_earlier_ones_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let known = |n: usize| format!("{n} outcomes of earlier runs are known");
+    let run = |args: &[&str]| tune(folder.path(), args);
+    assert!(!run(&["--portfolio"]).contains("earlier runs"));
+    assert!(run(&["--portfolio"]).contains(&known(4)));
+    // Another metric of the same times.
+    assert!(run(&["--metric", "render"]).contains(&known(8)));
+    // Other scenes, settings, fixed parameters and spaces are something else.
+    for other in [
+        &["--path-length", "2"][..],
+        &["-D", "branching_factor=4"],
+        &["-D", "accuracy=robust"],
+        &["--space", "canonical"],
+        &["--fov", "50"],
+    ] {
+        assert!(!run(other).contains("earlier runs"), "{other:?}");
+    }
+    let (code, text) = store(folder.path(), &["list", "memory"]);
+    assert_eq!(code, Some(0));
+    assert!(
+        text.contains("8 files") && text.contains("0 open"),
+        "{text}"
+    );
+    assert_eq!(store(folder.path(), &["fsck", "memory"]).0, Some(0));
+}

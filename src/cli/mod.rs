@@ -3,6 +3,7 @@
 mod demo;
 mod failure;
 mod inspect;
+mod memory;
 mod output;
 mod render;
 mod rows;

@@ -4,13 +4,12 @@ use std::{
     fs::File,
     io::{self, BufWriter, Write},
     path::PathBuf,
-    time::{SystemTime, UNIX_EPOCH},
 };
 
 use clap::{Args, Subcommand, ValueEnum};
 use raywright::tuner::store::{Changed, DamagePlace, Store, kind_name};
 
-use super::{Failure, output};
+use super::{Failure, memory::now, output};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum StoreCommand {
@@ -187,9 +186,4 @@ fn sizes(changed: &Changed) -> String {
         "{} files written anew, {} bytes before, {} after",
         changed.files, changed.bytes_before, changed.bytes_after
     )
-}
-
-/// Seconds since 1970.
-fn now() -> Result<f64, Failure> {
-    Ok(SystemTime::now().duration_since(UNIX_EPOCH)?.as_secs_f64())
 }

@@ -23,14 +23,14 @@ use raywright::{
     },
     tracer::{Indicators, Integrator},
     tune::{
-        self, Comparison, FrameReport, Metric, ParameterSpace, Session, Settings, SpaceAxes,
-        WallClock, milliseconds,
+        self, Comparison, FrameReport, Memory, Metric, ParameterSpace, Session, Settings,
+        SpaceAxes, WallClock, milliseconds,
     },
     tuner::{SEARCH_NAMES, search_by_name},
 };
 
 use super::{
-    Failure, output,
+    Failure, memory, output,
     run_options::{ParameterOptions, RunOptions, cancel_on_interrupt},
     scene::{SceneOptions, Stage},
 };
@@ -77,6 +77,10 @@ pub(crate) struct TuneArgs {
     /// Try known-good parameters first: the default, spatial splits, Morton order, large leaves
     #[arg(long)]
     portfolio: bool,
+    /// A folder that keeps every trial; what is known there of the same machine, scene and settings is not
+    /// measured again
+    #[arg(long, value_name = "FOLDER")]
+    store: Option<PathBuf>,
     /// The search: random, nelder-mead (from a Latin hypercube) or gaussian-process
     #[arg(long, default_value = "nelder-mead", value_parser = clap::builder::PossibleValuesParser::new(SEARCH_NAMES))]
     search: String,
@@ -123,6 +127,7 @@ impl TuneArgs {
             metric: MetricOption::Total,
             space: Space::Printed,
             portfolio: false,
+            store: None,
             search: "nelder-mead".into(),
             rounds: 7,
             width: 640,
@@ -146,7 +151,8 @@ pub(crate) fn run(args: &TuneArgs) -> Result<(), Failure> {
 fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     let base = args.parameters.applied_to(BuildParams::default())?;
     let stage = args.scene.prepare()?;
-    let space = ParameterSpace::new(&base, &args.parameters.names(), args.space.into())?;
+    let fixed = args.parameters.names();
+    let space = ParameterSpace::new(&base, &fixed, args.space.into())?;
     let settings = Settings {
         width: args.width,
         height: args.height,
@@ -163,6 +169,22 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
             "note: short paths give much weight to coherent camera rays, which misleads a tuner",
         );
     }
+    let mut memory = match &args.store {
+        Some(folder) => Some(memory::open(
+            folder, &space, &base, &fixed, &stage, &settings,
+        )?),
+        None => None,
+    };
+    let known = match &memory {
+        Some(memory) => memory.known(space.space(), settings.metric)?,
+        None => Vec::new(),
+    };
+    if !known.is_empty() {
+        output::note(format_args!(
+            "note: {} outcomes of earlier runs are known",
+            known.len()
+        ));
+    }
     let search = search_by_name(&args.search).expect("the option accepts the names of the tuner");
     let mut session = Session::new(
         &stage.world,
@@ -171,7 +193,8 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         space,
         search,
         WallClock::start(),
-    )?;
+    )?
+    .with_known(known)?;
     if args.portfolio {
         session = session.with_starts(&tune::portfolio(&base))?;
     }
@@ -192,7 +215,14 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         frames: vec![],
         summary: None,
     };
-    search_frames(args, &mut session, &mut run, &mut log, cancel)?;
+    search_frames(
+        args,
+        &mut session,
+        memory.as_mut(),
+        &mut run,
+        &mut log,
+        cancel,
+    )?;
     let searched_all = run.frames.len() == args.frames as usize;
 
     if let Some(best) = session.incumbent() {
@@ -261,6 +291,7 @@ fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {
 fn search_frames(
     args: &TuneArgs,
     session: &mut Session<'_, WallClock>,
+    mut memory: Option<&mut Memory>,
     run: &mut RunRecord,
     log: &mut RunLog,
     cancel: &CancelToken,
@@ -268,10 +299,20 @@ fn search_frames(
     let metric = session.settings().metric;
     let bar = output::bar(args.frames as usize, "tuning");
     for frame in 0..args.frames as usize {
-        let Some(report) = session.frame(cancel)? else {
+        let best = session.incumbent_cost_ms();
+        let mut begun = None;
+        let report = session.frame_told(cancel, |trial| {
+            begun = memory.as_deref_mut().map(|memory| {
+                let stamp = memory.begins(memory::now()?, trial)?;
+                Ok::<_, Failure>(stamp)
+            });
+        })?;
+        if let (Some(memory), Some(stamp)) = (memory.as_deref_mut(), begun.transpose()?) {
+            memory.ended(memory::now()?, stamp, report.as_ref(), metric)?;
+        }
+        let Some(report) = report else {
             break;
         };
-        let best = run.frames.last().and_then(|f| f.incumbent_cost_ms);
         let record = frame_record(frame, &report, metric, best);
         log.frame(&record)?;
         if !args.json {

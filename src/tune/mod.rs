@@ -7,11 +7,15 @@
 
 mod canonical;
 mod comparison;
+#[cfg(feature = "store")]
+mod memory;
 mod portfolio;
 mod session;
 mod space;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
+#[cfg(feature = "store")]
+pub use memory::Memory;
 pub use portfolio::portfolio;
 pub use session::{
     Clock, FrameReport, FrameTimes, Metric, SLOWEST_TRIAL, Session, SessionError, Settings,

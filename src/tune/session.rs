@@ -11,7 +11,7 @@ use std::time::Duration;
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
 use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
 use raywright_tracer::{Integrator, Rgb, Shot, World};
-use raywright_tuner::{Outcome, Search, TellError, Tuner};
+use raywright_tuner::{Config, Outcome, Search, TellError, Trial, Tuner};
 
 use super::space::{ParameterSpace, SpaceFault};
 
@@ -55,6 +55,15 @@ impl Metric {
     /// The cost of a frame.
     #[must_use]
     pub fn cost(self, build: Duration, render: Duration) -> Duration {
+        match self {
+            Self::Render => render,
+            Self::Total => build + render,
+        }
+    }
+
+    /// The same in seconds.
+    #[must_use]
+    pub fn cost_of(self, build: f64, render: f64) -> f64 {
         match self {
             Self::Render => render,
             Self::Total => build + render,
@@ -285,13 +294,34 @@ impl<'a, C: Clock> Session<'a, C> {
         })
     }
 
+    /// The same run, in which some outcomes are known: they are no frames of this run, and the search sees
+    /// them. To be told before [`with_starts`](Self::with_starts), which leaves out what is known.
+    ///
+    /// # Errors
+    /// [`SessionError::Tell`] if a cost cannot be one.
+    ///
+    /// # Panics
+    /// If a configuration is none of the space.
+    pub fn with_known(
+        mut self,
+        known: impl IntoIterator<Item = (Config, Outcome)>,
+    ) -> Result<Self, SessionError> {
+        for (config, outcome) in known {
+            self.tuner
+                .tell_known(&config, outcome)
+                .map_err(SessionError::Tell)?;
+        }
+        Ok(self)
+    }
+
     /// The same run, in which some parameters are tried first, in the order given; of those that are one
     /// configuration of its space the first.
     ///
     /// # Errors
     /// If parameters are not valid.
     pub fn with_starts(mut self, starts: &[BuildParams]) -> Result<Self, SpaceFault> {
-        let mut known = Vec::new();
+        let records = self.tuner.records().iter();
+        let mut known: Vec<Config> = records.map(|record| record.canonical.clone()).collect();
         for params in starts {
             let config = self.space.config(params)?;
             let canonical = self.space.space().canonical(&config);
@@ -310,6 +340,18 @@ impl<'a, C: Clock> Session<'a, C> {
     /// # Errors
     /// If the tuner refuses the measurement.
     pub fn frame(&mut self, cancel: &CancelToken) -> Result<Option<FrameReport>, SessionError> {
+        self.frame_told(cancel, |_| ())
+    }
+
+    /// The same; `begins` hears of the trial before it is built.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    pub fn frame_told(
+        &mut self,
+        cancel: &CancelToken,
+        begins: impl FnOnce(&Trial),
+    ) -> Result<Option<FrameReport>, SessionError> {
         let limit = match self.limit {
             Some(limit) => limit,
             None => {
@@ -326,6 +368,7 @@ impl<'a, C: Clock> Session<'a, C> {
             }
         };
         let trial = self.tuner.ask();
+        begins(&trial);
         let params = self.space.params(&trial.config);
         let trial_result = match self.stage.build(&params) {
             Err(error) => Err(TrialFailure::Build(error)),
@@ -390,12 +433,24 @@ impl<'a, C: Clock> Session<'a, C> {
         self.finished += 1;
     }
 
+    /// The space that is searched.
+    #[must_use]
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
     /// The best parameters so far.
     #[must_use]
     pub fn incumbent(&self) -> Option<BuildParams> {
         self.tuner
             .incumbent()
             .map(|record| self.space.params(&record.config))
+    }
+
+    /// What the best parameters so far cost on average, in milliseconds.
+    #[must_use]
+    pub fn incumbent_cost_ms(&self) -> Option<f64> {
+        self.tuner.incumbent().map(|record| record.cost * 1e3)
     }
 
     /// The picture so far: one sample per pixel for every finished frame.

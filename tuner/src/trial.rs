@@ -40,6 +40,8 @@ pub struct Trial {
 pub enum Reason {
     /// A given starting configuration.
     Start,
+    /// Not asked at all: its outcome was known.
+    Known,
     /// Proposed by the search.
     Proposed {
         /// Name of the search.
@@ -57,6 +59,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Reason::Start => f.write_str("start"),
+            Reason::Known => f.write_str("known"),
             Reason::Proposed { search, step } => write!(f, "{search}: {step}"),
             Reason::Replacement => f.write_str("replacement"),
             Reason::Replicate => f.write_str("replicate"),

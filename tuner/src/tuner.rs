@@ -199,6 +199,29 @@ impl Tuner {
         self.tell(id, outcome)
     }
 
+    /// Tells what was measured elsewhere or before: the record counts as one of this run, and the search
+    /// sees it. A cancelled outcome changes nothing.
+    ///
+    /// # Errors
+    ///
+    /// If the cost is not finite or negative.
+    ///
+    /// # Panics
+    ///
+    /// If `config` is not a configuration of the space, see [`Space::check`].
+    pub fn tell_known(&mut self, config: &Config, outcome: Outcome) -> Result<Told, TellError> {
+        if let Err(error) = self.space.check(config) {
+            panic!("not a configuration of this space: {error}");
+        }
+        let canonical = self.space.canonical(config);
+        let trial = self.hand_out(config.clone(), canonical, Origin::Tuner, Reason::Known);
+        let told = self.tell(trial.id, outcome);
+        if told.is_err() {
+            self.open.remove(&trial.id);
+        }
+        told
+    }
+
     /// The best record by mean cost; of equal ones the older. `None` until a trial is done.
     /// Records with a failure do not count.
     pub fn incumbent(&self) -> Option<&Record> {

@@ -101,6 +101,27 @@ fn starts_come_first_and_return_when_cancelled() {
 }
 
 #[test]
+fn what_is_known_is_not_asked_again_and_can_be_the_best() {
+    let space = line();
+    let mut tuner = Tuner::new(space.clone(), Box::new(Random::new()), 0);
+    let bad = tuner.tell_known(&n(&space, 4), Outcome::Done { cost: f64::NAN });
+    assert!(matches!(bad, Err(TellError::BadCost { .. })));
+    tuner.tell_known(&n(&space, 5), Outcome::Cancelled).unwrap();
+    assert!(tuner.records().is_empty());
+    let told = tuner
+        .tell_known(&n(&space, 4), Outcome::Done { cost: 1.0 })
+        .unwrap();
+    assert!(told.is_incumbent);
+    tuner.tell_known(&n(&space, 6), failed()).unwrap();
+    for _ in 0..5 {
+        let trial = tuner.ask();
+        assert!(![Some(4), Some(6)].contains(&trial.config.integer("n")));
+        tuner.tell(trial.id, Outcome::Done { cost: 2.0 }).unwrap();
+    }
+    assert_eq!(tuner.incumbent().unwrap().config.integer("n"), Some(4));
+}
+
+#[test]
 fn a_start_that_failed_is_not_asked_again() {
     let space = line();
     let mut tuner = Tuner::new(space.clone(), Box::new(Random::new()), 0)

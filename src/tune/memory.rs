@@ -1,0 +1,146 @@
+//! What runs leave for later ones: every trial of a session in a store, and what is known of the same
+//! machine, scene and space told to a tuner before its first trial.
+//!
+//! Invariants: a trial is in the store before it is rendered, so that one that takes the program with it
+//! is known as well; times are kept apart by build and rendering, so that a run may have another metric
+//! than those before. Times of another machine are never told: [`Query`] leaves them out.
+
+use raywright_tuner::{
+    Config, Outcome, Space, SpaceError, Trial,
+    store::{
+        Machine, Query, Records, Scene, SpaceFacts, Stamp, Store, StoreError, TrialOpen,
+        TrialOutcome, Writer,
+    },
+};
+
+use super::{FrameReport, FrameTimes, Metric};
+
+/// Seconds of building and rendering, as measures of outcomes.
+const MEASURES: [&str; 2] = ["build_s", "render_s"];
+
+/// A log of one session, and what earlier ones left.
+#[derive(Debug)]
+pub struct Memory {
+    writer: Writer,
+    records: Records,
+    space: SpaceFacts,
+    machine: Machine,
+    scene: Scene,
+}
+
+impl Memory {
+    /// Reads a store, and begins a log with what `writer` keeps, at `time` (seconds since 1970). What
+    /// changes times should be a fact of the machine or of the scene.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn new(
+        store: &Store,
+        mut writer: Writer,
+        time: f64,
+        space: &Space,
+        machine: Machine,
+        scene: Scene,
+    ) -> Result<Self, StoreError> {
+        let space = SpaceFacts::new(space);
+        let records = store.read()?.records;
+        // Told once: each log would repeat them otherwise.
+        if records.space(&space.id).is_none() {
+            writer.append(time, space.clone())?;
+        }
+        if records.machine(&machine.id).is_none() {
+            writer.append(time, machine.clone())?;
+        }
+        if records.scene(&scene.id).is_none() {
+            writer.append(time, scene.clone())?;
+        }
+        Ok(Self {
+            writer,
+            records,
+            space,
+            machine,
+            scene,
+        })
+    }
+
+    /// The outcomes of earlier runs on this machine with this scene and space, in the order of their
+    /// writers, their cost by `metric`. Cancelled trials say nothing.
+    ///
+    /// # Errors
+    /// If a configuration is none of the space.
+    pub fn known(
+        &self,
+        space: &Space,
+        metric: Metric,
+    ) -> Result<Vec<(Config, Outcome)>, SpaceError> {
+        let query = Query::new(self.machine.id.clone())
+            .with_scene(self.scene.id.clone())
+            .with_space(self.space.id.clone());
+        let mut known = Vec::new();
+        for measured in self.records.outcomes(&query) {
+            let outcome = match &measured.outcome.outcome {
+                Outcome::Done { .. } => {
+                    let [Some(&build), Some(&render)] =
+                        MEASURES.map(|name| measured.outcome.measures.get(name))
+                    else {
+                        continue;
+                    };
+                    Outcome::Done {
+                        cost: metric.cost_of(build, render),
+                    }
+                }
+                Outcome::Cancelled => continue,
+                failed => failed.clone(),
+            };
+            known.push((measured.trial.config_in(space)?, outcome));
+        }
+        Ok(known)
+    }
+
+    /// Notes that a trial begins at `time`, seconds since 1970; it is on the disk when this returns, if
+    /// the writer syncs each record.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn begins(&mut self, time: f64, trial: &Trial) -> Result<Stamp, StoreError> {
+        let open = TrialOpen::new(
+            self.space.id.clone(),
+            self.machine.id.clone(),
+            self.scene.id.clone(),
+            &trial.config,
+            &trial.reason.to_string(),
+        );
+        self.writer.append(time, open)
+    }
+
+    /// Notes how the trial ended that began as `trial`; `None` if it was cancelled.
+    ///
+    /// # Errors
+    /// [`StoreError`].
+    pub fn ended(
+        &mut self,
+        time: f64,
+        trial: Stamp,
+        report: Option<&FrameReport>,
+        metric: Metric,
+    ) -> Result<(), StoreError> {
+        let outcome = match report.map(|report| &report.outcome) {
+            None => TrialOutcome::new(trial, Outcome::Cancelled),
+            Some(Err(failure)) => {
+                let reason = failure.to_string();
+                TrialOutcome::new(trial, Outcome::Failed { reason })
+            }
+            Some(Ok(FrameTimes { build, render })) => {
+                let times = [build.as_secs_f64(), render.as_secs_f64()];
+                let cost = metric.cost_of(times[0], times[1]);
+                let done = TrialOutcome::new(trial, Outcome::Done { cost });
+                MEASURES
+                    .iter()
+                    .zip(times)
+                    .fold(done, |done, (name, time)| done.with_measure(name, time))
+            }
+        };
+        self.writer.append(time, outcome)?;
+        Ok(())
+    }
+}
