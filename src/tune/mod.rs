@@ -10,6 +10,7 @@ mod comparison;
 #[cfg(feature = "store")]
 mod memory;
 mod portfolio;
+mod recording;
 mod session;
 mod space;
 
@@ -17,6 +18,7 @@ pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
 #[cfg(feature = "store")]
 pub use memory::Memory;
 pub use portfolio::portfolio;
+pub use recording::{Recorded, RecordedFrame, RecordedTree, Recorder, random_params};
 pub use session::{
     Clock, FrameReport, FrameTimes, Metric, SLOWEST_TRIAL, Session, SessionError, Settings,
     TrialFailure, WallClock,

@@ -103,6 +103,8 @@ pub struct Settings {
 pub enum SessionError {
     /// The camera cannot be used.
     Camera(CameraError),
+    /// There is no camera.
+    NoCamera,
     /// No picture of this size.
     Film(FilmError),
     /// A tree for a baseline could not be built.
@@ -117,6 +119,7 @@ impl std::fmt::Display for SessionError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Camera(error) => error.fmt(f),
+            Self::NoCamera => f.write_str("there is no camera"),
             Self::Film(error) => error.fmt(f),
             Self::Build(error) => error.fmt(f),
             Self::Tell(error) => error.fmt(f),
@@ -173,13 +176,24 @@ pub struct FrameTimes {
 #[derive(Debug)]
 pub(super) struct Stage<'a, C> {
     world: &'a World,
-    camera: Camera,
+    pub(super) camera: Camera,
     pub(super) settings: Settings,
     clock: C,
     workspace: BuildWorkspace,
 }
 
-impl<C: Clock> Stage<'_, C> {
+impl<'a, C: Clock> Stage<'a, C> {
+    /// A stage; camera and instruction set have been looked at.
+    pub(super) fn new(world: &'a World, camera: Camera, settings: Settings, clock: C) -> Self {
+        Self {
+            world,
+            camera,
+            settings,
+            clock,
+            workspace: BuildWorkspace::default(),
+        }
+    }
+
     /// Builds a tree; the time that it took.
     pub(super) fn build(&mut self, params: &BuildParams) -> Result<(Bvh, Duration), BuildError> {
         let start = self.clock.now();
@@ -277,15 +291,8 @@ impl<'a, C: Clock> Session<'a, C> {
             return Err(SessionError::Isa(settings.isa));
         }
         let tuner = Tuner::new(space.space().clone(), search, settings.seed);
-        let stage = Stage {
-            world,
-            camera,
-            settings,
-            clock,
-            workspace: BuildWorkspace::default(),
-        };
         Ok(Self {
-            stage,
+            stage: Stage::new(world, camera, settings, clock),
             space,
             tuner,
             film,
