@@ -10,6 +10,7 @@ mod rows;
 mod run_options;
 mod scene;
 mod store;
+mod study;
 mod tune;
 mod volume;
 
@@ -46,6 +47,9 @@ enum Command {
     /// What tuning left in a folder of logs: look, check, merge, export
     #[command(subcommand)]
     Store(store::StoreCommand),
+    /// Measurements that are kept as data
+    #[command(subcommand)]
+    Study(study::StudyCommand),
     /// Volumes: what is in a file, and pictures of it
     #[command(subcommand)]
     Volume(volume::VolumeCommand),
@@ -59,6 +63,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), Failure> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Store(command) => store::run(&command),
+        Command::Study(command) => study::run(&command),
         Command::Volume(command) => volume::run(&command),
     }
 }
