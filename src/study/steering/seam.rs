@@ -34,7 +34,11 @@ impl Seam {
         options.step = drawn.quality.step as f32;
         options.pixels_per_ray = drawn.quality.pixels_per_ray;
         options.clip = moment.clip;
-        let prepared = stage.caster.prepare(&moment.function);
+        let appearance = moment.appearance();
+        let prepared = stage
+            .caster
+            .prepare_appearance(appearance)
+            .map_err(FrameError::from)?;
         let uniform = prepared
             .render(moment.camera, stage.size, &options)
             .map_err(FrameError::from)?;

@@ -15,7 +15,7 @@ pub use clock::{FrameClock, WorkTimer};
 use rest::Rest;
 
 use crate::{
-    appearance::{Appearance, AppearanceError, IsoSurface},
+    appearance::{Appearance, AppearanceError},
     cast::{CastError, CastOptions, Picture, Prepared, Raycaster, parts},
     enclosure::{EnclosureError, EnclosureParams},
     estimate::{EstimateMethod, Estimator, PreparedEstimate},
@@ -213,7 +213,7 @@ impl<'a> FrameLoop<'a> {
         // That of the last frame: whether a short ray has a sample depends on it.
         options.step = self.steering.shown().map_or(1.0, |shown| shown.step as f32);
         let size = self.params.size;
-        let appearance = appearance(moment);
+        let appearance = moment.appearance();
         let kept = self
             .shown
             .take()
@@ -370,18 +370,6 @@ fn inside(
         limits,
         shares,
     )))
-}
-
-/// What is to be seen at a moment: its surfaces are white and opaque.
-fn appearance(moment: &Moment) -> Appearance {
-    let mut appearance = Appearance::from(moment.function.clone());
-    let surfaces = moment.iso_values.iter().map(|&value| IsoSurface {
-        value,
-        colour: [1.0; 3],
-        opacity: 1.0,
-    });
-    appearance.surfaces = surfaces.collect();
-    appearance
 }
 
 /// An appearance, and the tree around what can be seen if there is to be one.

@@ -32,7 +32,10 @@ pub mod script;
 use raywright_bvh::Aabb;
 use raywright_imaging::Camera;
 
-use crate::transfer::TransferFunction;
+use crate::{
+    appearance::{Appearance, IsoSurface},
+    transfer::TransferFunction,
+};
 pub use error::SequenceError;
 pub use file::{CameraKey, Event, EventKind, FORMAT, MAX_FRAMES, Sequence, TransferKey};
 
@@ -60,6 +63,19 @@ pub struct Moment {
 }
 
 impl Moment {
+    /// The transfer function and the surfaces, which are white and opaque.
+    #[must_use]
+    pub fn appearance(&self) -> Appearance {
+        let mut appearance = Appearance::from(self.function.clone());
+        let surfaces = self.iso_values.iter().map(|&value| IsoSurface {
+            value,
+            colour: [1.0; 3],
+            opacity: 1.0,
+        });
+        appearance.surfaces = surfaces.collect();
+        appearance
+    }
+
     /// Whether the same is to be seen as at another moment: nothing moved.
     #[must_use]
     pub fn shows_the_same(&self, other: &Self) -> bool {
