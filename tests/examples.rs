@@ -68,6 +68,21 @@ fn tune_a_build() {
 }
 
 #[test]
+fn tune_a_sort() {
+    let Some(printed) = run("06_tune_a_sort") else {
+        return;
+    };
+    // The default of many libraries, insertion up to a dozen elements, is better than none.
+    let last = printed.lines().last().unwrap_or_default();
+    assert!(
+        printed.lines().count() > 1
+            && last.contains("merges=true")
+            && !last.contains("insertion=1 "),
+        "{printed}"
+    );
+}
+
+#[test]
 fn a_volume() {
     let Some(printed) = run("07_a_volume") else {
         return;
