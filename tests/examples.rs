@@ -72,7 +72,7 @@ fn tune_a_sort() {
     let Some(printed) = run("06_tune_a_sort") else {
         return;
     };
-    // The default of many libraries, insertion up to a dozen elements, is better than none.
+    // Merging rows that are sorted already costs little, and insertion sorts short pieces.
     let last = printed.lines().last().unwrap_or_default();
     assert!(
         printed.lines().count() > 1
