@@ -115,11 +115,11 @@ fn check_range(name: &'static str, value: f64, min: f64, max: f64) -> Result<(),
 }
 
 /// The first candidate of the least value.
-fn least<'a>(
-    candidates: &'a [Vec<f64>],
+fn least(
+    candidates: &[Vec<f64>],
     axes: usize,
     value: impl Fn(&[f64]) -> f64,
-) -> Result<Option<&'a Vec<f64>>, PredictError> {
+) -> Result<Option<&Vec<f64>>, PredictError> {
     let mut best: Option<(&Vec<f64>, f64)> = None;
     for candidate in candidates {
         check_point(candidate, axes)?;
