@@ -25,6 +25,8 @@ pub(crate) enum Method {
     PortfolioUnmeasured(usize),
     /// So many members, each measured for a frame.
     PortfolioMeasured(usize),
+    /// What the nearest neighbour and least squares say, and a portfolio of so many members; all measured.
+    ShortlistMeasured(usize),
 }
 
 /// What came out in a state.
@@ -106,6 +108,21 @@ pub(crate) fn methods() -> Vec<(&'static str, SpaceKind, Method)> {
             Canonical,
             Method::PortfolioMeasured(5),
         ),
+        (
+            "nearest + least squares, measured",
+            Canonical,
+            Method::ShortlistMeasured(0),
+        ),
+        (
+            "nearest + least squares + 3, measured",
+            Canonical,
+            Method::ShortlistMeasured(3),
+        ),
+        (
+            "nearest + least squares + 5, measured",
+            Canonical,
+            Method::ShortlistMeasured(5),
+        ),
     ]
 }
 
@@ -132,16 +149,10 @@ impl Method {
         let axes = table.points[0].len();
         match self {
             Method::Fixed(name) => {
-                let row = case
-                    .problem
-                    .rows
-                    .iter()
-                    .position(|(row, _)| row.name == name);
-                let row = row.ok_or_else(|| format!("no row {name}"))?;
-                let kept = case.cost(row, metric);
+                let kept = case.problem.named(name, metric);
                 Ok(Answer {
                     probes: Vec::new(),
-                    kept,
+                    kept: kept.ok_or_else(|| format!("no row {name}"))?,
                 })
             }
             Method::Nearest(scaling) => {
@@ -170,32 +181,52 @@ impl Method {
                 })
             }
             Method::PortfolioMeasured(size) => {
-                let mut portfolio = portfolio(features, known, metric, size)?;
-                let mut probes = Vec::new();
-                while let Some(member) = portfolio.next(state)?.map(<[f64]>::to_vec) {
-                    let cost = case.cost(table.nearest(&member), metric);
-                    portfolio.learn(state, &member, cost)?;
-                    probes.push(cost);
-                }
-                let point = portfolio.predict(state, &[])?.ok_or("no member")?;
-                Ok(Answer {
-                    probes,
-                    kept: case.cost(table.nearest(&point), metric),
-                })
+                measured(portfolio(features, known, metric, size)?, asked, metric)
+            }
+            Method::ShortlistMeasured(size) => {
+                let nearest = NearestNeighbour::new(features.clone(), axes, Scaling::Rescaled);
+                let squares = LeastSquares::new(features.clone(), axes, Terms::Quadratic, RIDGE)?;
+                let mut members = vec![
+                    point(Box::new(nearest), false, known, asked, metric)?,
+                    point(Box::new(squares), false, known, asked, metric)?,
+                ];
+                members.extend(greedy_members(&costs(known, metric), size)?);
+                let shortlist = Portfolio::new(features.clone(), Scaling::Rescaled, members)?;
+                measured(shortlist, asked, metric)
             }
         }
     }
 }
 
+/// Measures all members for a frame each, and keeps the best.
+fn measured(
+    mut portfolio: Portfolio,
+    (case, table): (&Case, &Table),
+    metric: Metric,
+) -> Result<Answer, Box<dyn Error>> {
+    let state = &case.state.features;
+    let mut probes = Vec::new();
+    while let Some(member) = portfolio.next(state)?.map(<[f64]>::to_vec) {
+        let cost = case.cost(table.nearest(&member), metric);
+        portfolio.learn(state, &member, cost)?;
+        probes.push(cost);
+    }
+    let point = portfolio.predict(state, &[])?.ok_or("no member")?;
+    Ok(Answer {
+        probes,
+        kept: case.cost(table.nearest(&point), metric),
+    })
+}
+
 /// Tells a predictor what the searches of the known cases saw, the first frames of all before the second
 /// ones, and asks it for another case, the rows of which are the candidates.
-fn predicted(
+fn point(
     mut model: Box<dyn Predictor>,
     in_seconds: bool,
     known: &[(&Case, &Table)],
     (case, table): (&Case, &Table),
     metric: Metric,
-) -> Result<Answer, Box<dyn Error>> {
+) -> Result<Vec<f64>, Box<dyn Error>> {
     let longest = known.iter().map(|(case, _)| case.samples.len()).max();
     for index in 0..longest.unwrap_or(0) {
         for (case, table) in known {
@@ -211,11 +242,32 @@ fn predicted(
         }
     }
     let point = model.predict(&case.state.features, &table.points)?;
-    let row = table.nearest(&point.ok_or("nothing was learned")?);
+    Ok(point.ok_or("nothing was learned")?)
+}
+
+fn predicted(
+    model: Box<dyn Predictor>,
+    in_seconds: bool,
+    known: &[(&Case, &Table)],
+    asked: (&Case, &Table),
+    metric: Metric,
+) -> Result<Answer, Box<dyn Error>> {
+    let point = point(model, in_seconds, known, asked, metric)?;
+    let (case, table) = asked;
     Ok(Answer {
         probes: Vec::new(),
-        kept: case.cost(row, metric),
+        kept: case.cost(table.nearest(&point), metric),
     })
+}
+
+/// For each known case the rows of its table, and their costs.
+fn costs(known: &[(&Case, &Table)], metric: Metric) -> Vec<Vec<(Vec<f64>, f64)>> {
+    let of = |&(case, table): &(&Case, &Table)| {
+        let rows = case.problem.rows.iter().zip(&table.points);
+        rows.filter_map(|((_, costs), point)| Some((point.clone(), (*costs)?[metric as usize])))
+            .collect()
+    };
+    known.iter().map(of).collect()
 }
 
 /// A portfolio over the whole tables of the known cases: searches have hardly a row in common.
@@ -225,14 +277,7 @@ fn portfolio(
     metric: Metric,
     size: usize,
 ) -> Result<Portfolio, Box<dyn Error>> {
-    let states: Vec<Vec<(Vec<f64>, f64)>> = known
-        .iter()
-        .map(|(case, table)| {
-            let rows = case.problem.rows.iter().zip(&table.points);
-            rows.filter_map(|((_, costs), point)| Some((point.clone(), (*costs)?[metric as usize])))
-                .collect()
-        })
-        .collect();
+    let states = costs(known, metric);
     let members = greedy_members(&states, size)?;
     let mut portfolio = Portfolio::new(features.clone(), Scaling::Rescaled, members)?;
     for ((case, _), measured) in known.iter().zip(&states) {

@@ -101,7 +101,8 @@ impl State {
 }
 
 impl Portfolio {
-    /// A portfolio of the given members, the most useful first, of which nothing is known.
+    /// A portfolio of the given members, the most useful first, of which nothing is known. What is given
+    /// twice is one member.
     ///
     /// # Errors
     /// [`PredictError::NoMember`] without one; for members that are no points of one cube.
@@ -111,13 +112,17 @@ impl Portfolio {
         members: Vec<Vec<f64>>,
     ) -> Result<Portfolio, PredictError> {
         let axes = members.first().ok_or(PredictError::NoMember)?.len();
-        for member in &members {
-            check_point(member, axes)?;
+        let mut different: Vec<Vec<f64>> = Vec::with_capacity(members.len());
+        for member in members {
+            check_point(&member, axes)?;
+            if !different.contains(&member) {
+                different.push(member);
+            }
         }
         Ok(Portfolio {
             features,
             scaling,
-            members,
+            members: different,
             states: Vec::new(),
         })
     }
@@ -255,6 +260,7 @@ mod tests {
         let features = Features::new(vec![]).unwrap();
         let error = Portfolio::new(features.clone(), Scaling::Raw, vec![]).unwrap_err();
         assert_eq!(error, PredictError::NoMember);
+        assert_eq!(portfolio(&[0.2, 0.4, 0.2]).members().len(), 2);
         let members = vec![vec![0.1], vec![0.1, 0.2]];
         assert!(Portfolio::new(features, Scaling::Raw, members).is_err());
     }
