@@ -1,4 +1,4 @@
-//! `cargo bench -p raywright-benches --bench predictors [-- FOLDER]`: how much of a search can be predicted?
+//! `cargo bench -p raywright-benches --bench predictors [-- FOLDER [SEED]]`: how much of a search can be predicted?
 //!
 //! The protocol of the autotuning paper (Herveau, Pfaffe, Tillmann, Tichy & Dachsbacher, section 7) on recorded
 //! tables: a search of 80 frames for each scene and camera; predictors learn what the searches saw in 80 % of
@@ -21,7 +21,12 @@ mod methods;
 mod recorded;
 mod states;
 
-use std::{collections::BTreeMap, env, error::Error, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    env,
+    error::Error,
+    path::{Path, PathBuf},
+};
 
 use methods::{Answer, methods};
 use problems::{Metric, problems};
@@ -48,8 +53,8 @@ struct Score {
 
 fn main() -> Result<(), Box<dyn Error>> {
     // cargo bench hands its own options on.
-    let folder = env::args().skip(1).find(|arg| !arg.starts_with('-'));
-    let folder = folder.map_or_else(
+    let mut given = env::args().skip(1).filter(|arg| !arg.starts_with('-'));
+    let folder = given.next().map_or_else(
         || {
             let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
             root.join("../../shared/data/tuning")
@@ -60,11 +65,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{} has no recorded problems", folder.display());
         return Ok(());
     }
-    let (mut all, mut missed) = (0, Vec::new());
+    let seed = given.next().map_or(Ok(0), |seed| seed.parse())?;
+    let (mut all, mut missed, mut judged) = (0, Vec::new(), Vec::new());
     for metric in Metric::ALL {
-        let scores = scores(&folder, metric)?;
+        let scores = scores(&folder, metric, seed)?;
         let best = print(metric, &scores);
         let (name, rows) = &scores[best];
+        judged.push(format!("judged: {}, {name}", metric.name()));
         for (what, value, least) in [
             ("of the roofline", geometric(rows, |s| s.roofline), 0.95),
             (
@@ -85,8 +92,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!();
-    for missed in &missed {
-        println!("{missed}");
+    for line in judged.iter().chain(&missed) {
+        println!("{line}");
     }
     println!("goals: {} of {all} met", all - missed.len());
     Ok(())
@@ -95,7 +102,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// For each method, by name, all of its predictions.
 type Scores = Vec<(&'static str, Vec<Score>)>;
 
-fn scores(folder: &std::path::Path, metric: Metric) -> Result<Scores, Box<dyn Error>> {
+fn scores(folder: &Path, metric: Metric, seed: u64) -> Result<Scores, Box<dyn Error>> {
     let (problems, states, features) = (problems(folder)?, states(folder)?, features()?);
     let tables = |kind| -> Result<Vec<Table>, Box<dyn Error>> {
         problems
@@ -109,8 +116,8 @@ fn scores(folder: &std::path::Path, metric: Metric) -> Result<Scores, Box<dyn Er
         .iter()
         .map(|method| (method.0, Vec::new()))
         .collect();
-    let mut draw = draws();
-    for repeat in 0..REPEATS {
+    let mut draw = draws(seed);
+    for repeat in (0..REPEATS).map(|repeat| seed * REPEATS + repeat) {
         let cases = problems
             .iter()
             .map(|problem| Case::new(problem, &states[&problem.name], metric, repeat))
@@ -237,9 +244,9 @@ fn geometric(rows: &[Score], of: impl Fn(&Score) -> f64) -> f64 {
     mean(rows, |row| of(row).ln()).exp()
 }
 
-/// Numbers below a bound, always the same ones.
-fn draws() -> impl FnMut(usize) -> usize {
-    let mut state = 1_u64;
+/// Numbers below a bound, the same ones for the same seed.
+fn draws(seed: u64) -> impl FnMut(usize) -> usize {
+    let mut state = seed.wrapping_add(1);
     move |bound| {
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)

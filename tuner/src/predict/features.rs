@@ -14,8 +14,9 @@ use std::sync::Arc;
 use super::PredictError;
 use crate::Scale;
 
-/// Weight of features of the view in distances of rescaled states. Measured on recorded tables: the loss of
-/// the nearest neighbour falls from 7.0 to 4.1 % in render time.
+/// Weight of features of the view in distances of rescaled states. On ten recorded states the nearest
+/// neighbour then reaches 95.3 % of the roofline in render time, not 94.9, and 88.9, not 88.0, with the build
+/// (bench `predictors`): little, and less than what another draw of the states changes.
 const VIEW_WEIGHT: f64 = 0.2;
 
 /// What a feature describes.

@@ -236,8 +236,13 @@ impl Predictor for RadialBasis {
             StepSize::Fixed(step) => (step * square).min(1.0),
             StepSize::Normalised(share) => share,
         };
-        for (weight, function) in self.weights.iter_mut().zip(&functions) {
-            *weight += share * error * (function / square);
+        let pairs = self.weights.iter().zip(&functions);
+        let weights: Vec<f64> = pairs
+            .map(|(weight, function)| weight + share * error * (function / square))
+            .collect();
+        // A huge reward far from all centres leaves the numbers: better not learned than infinite.
+        if weights.iter().all(|weight| weight.is_finite()) {
+            self.weights = weights;
         }
         Ok(())
     }
@@ -356,6 +361,25 @@ mod tests {
                 for candidate in &candidates {
                     assert!(model.value(&state, candidate).unwrap() <= value);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn weights_stay_finite_far_from_all_centres() {
+        let settings = RadialSettings {
+            scaling: Scaling::Raw,
+            ..RadialSettings::rescaled()
+        };
+        let settings = RadialSettings {
+            reward: Reward::Inverse,
+            ..settings
+        };
+        let mut model = model(settings);
+        for far in [100.0, 150.0, 190.0, 400.0, 1e200] {
+            for cost in [1e-300, 1.0, 1e300] {
+                model.learn(&[far; 3], &[0.5; 2], cost).unwrap();
+                assert!(model.weights.iter().all(|weight| weight.is_finite()));
             }
         }
     }
