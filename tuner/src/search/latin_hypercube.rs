@@ -6,7 +6,7 @@
 use crate::rng::Stream;
 
 /// `count` points in the unit cube of `dimensions` axes, uniform within their slices.
-pub(super) fn latin_hypercube(
+pub(crate) fn latin_hypercube(
     count: usize,
     dimensions: usize,
     stream: &mut Stream,

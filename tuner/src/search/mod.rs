@@ -5,7 +5,7 @@
 //! Every search passes [`conformance::check`](crate::conformance::check).
 
 mod gaussian_process;
-mod latin_hypercube;
+pub(crate) mod latin_hypercube;
 mod nelder_mead;
 mod random;
 

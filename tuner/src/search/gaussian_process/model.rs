@@ -11,6 +11,8 @@
 //! Invariants: a model is a function of its points, values, noises and lengths; its numbers are finite;
 //! where nothing is known it predicts the mean with the deviation of the values.
 
+use crate::linear::{dot, factorise, forward, solve, triangle};
+
 /// The least noise, as a share of the variance: the kernel matrix stays regular.
 const LEAST_NOISE: f64 = 1e-6;
 
@@ -128,75 +130,6 @@ fn kernel(a: &[f64], b: &[f64]) -> f64 {
     let square: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
     let s = (5.0 * square).sqrt();
     (1.0 + s + s * s / 3.0) * (-s).exp()
-}
-
-/// Eight sums side by side: one after the other would wait for each addition.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const WIDE: usize = 8;
-    let mut sums = [0.0; WIDE];
-    let (a_wide, b_wide) = (a.chunks_exact(WIDE), b.chunks_exact(WIDE));
-    let rest: f64 = (a_wide.remainder().iter().zip(b_wide.remainder()))
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a_wide.zip(b_wide) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
-/// Where a row of a lower triangle begins.
-fn triangle(row: usize) -> usize {
-    row * (row + 1) / 2
-}
-
-/// The Cholesky factor of a symmetric matrix, in its place.
-fn factorise(matrix: &mut [f64], count: usize) -> Option<()> {
-    for row in 0..count {
-        let start = triangle(row);
-        for column in 0..=row {
-            let (above, own) = matrix.split_at_mut(start);
-            let other = if column == row {
-                &own[..column]
-            } else {
-                &above[triangle(column)..triangle(column) + column]
-            };
-            let rest = own[column] - dot(&own[..column], other);
-            own[column] = if column == row {
-                if rest.is_nan() || rest <= 0.0 {
-                    return None;
-                }
-                rest.sqrt()
-            } else {
-                rest / above[triangle(column) + column]
-            };
-        }
-    }
-    Some(())
-}
-
-/// L⁻¹ · b.
-fn forward(factor: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut x: Vec<f64> = Vec::with_capacity(b.len());
-    for (row, value) in b.iter().enumerate() {
-        let own = &factor[triangle(row)..triangle(row) + row];
-        x.push((value - dot(own, &x[..row])) / factor[triangle(row) + row]);
-    }
-    x
-}
-
-/// (L·Lᵀ)⁻¹ · b.
-fn solve(factor: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut x = forward(factor, b);
-    for row in (0..x.len()).rev() {
-        x[row] /= factor[triangle(row) + row];
-        let own = x[row];
-        for (column, value) in x[..row].iter_mut().enumerate() {
-            *value -= own * factor[triangle(row) + column];
-        }
-    }
-    x
 }
 
 #[cfg(test)]

@@ -1,0 +1,267 @@
+//! `cargo bench -p raywright-benches --bench predictors [-- FOLDER [SEED]]`: how much of a search can be predicted?
+//!
+//! The protocol of the autotuning paper (Herveau, Pfaffe, Tillmann, Tichy & Dachsbacher, section 7) on recorded
+//! tables: a search of 80 frames for each scene and camera; predictors learn what the searches saw in 80 % of
+//! them, drawn at random, and answer in the others; 15 draws. The tables hold two cameras of five scenes, not
+//! a hundred of seven, and 9 of the 17 indicators; the search's answers and the predictions are recorded rows.
+//! Members of portfolios come from the whole tables of the known states; the dozen configurations that were
+//! measured in all scenes were once named by people who knew all of them, which favours portfolios.
+//!
+//! Speed-up is what the 80 frames of the search took over 80 frames predicted, probes included. Roofline is the
+//! best cost of the search over the predicted one. Overhead is what 80 frames took beyond the best known
+//! configuration of the state, found by the search or any predictor; removed is the share of the search's. Break-even is the frame after which
+//! the search, whose best is used after its end, has paid off.
+//!
+//! Goals are those of the paper's summary, for the predictor that removes most of the overhead on the very
+//! predictions that are judged: a choice among many by 30 numbers. Other seeds tell how firm it is.
+
+#[path = "../replay/problems.rs"]
+mod problems;
+#[path = "../replay/spaces.rs"]
+mod spaces;
+
+mod methods;
+mod recorded;
+mod states;
+
+use std::{
+    collections::BTreeMap,
+    env,
+    error::Error,
+    path::{Path, PathBuf},
+};
+
+use methods::{Answer, methods};
+use problems::{Metric, problems};
+use recorded::{Case, FRAMES, Table};
+use spaces::SpaceKind;
+use states::{features, states};
+
+const REPEATS: u64 = 15;
+
+/// One prediction, judged.
+#[derive(Clone, Debug)]
+struct Score {
+    scene: String,
+    /// The search's best over the best of the whole table.
+    search_loss: f64,
+    /// Another camera of the scene was learned from.
+    scene_known: bool,
+    speed_up: f64,
+    roofline: f64,
+    overhead_removed: f64,
+    /// Infinite: never.
+    break_even: f64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // cargo bench hands its own options on.
+    let mut given = env::args().skip(1).filter(|arg| !arg.starts_with('-'));
+    let folder = given.next().map_or_else(
+        || {
+            let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+            root.join("../../shared/data/tuning")
+        },
+        PathBuf::from,
+    );
+    if !folder.join("builder_table.csv").is_file() {
+        println!("{} has no recorded problems", folder.display());
+        return Ok(());
+    }
+    let seed = given.next().map_or(Ok(0), |seed| seed.parse())?;
+    let (mut all, mut missed, mut judged) = (0, Vec::new(), Vec::new());
+    for metric in Metric::ALL {
+        let scores = scores(&folder, metric, seed)?;
+        let best = print(metric, &scores);
+        let (name, rows) = &scores[best];
+        judged.push(format!("judged: {}, {name}", metric.name()));
+        for (what, value, least) in [
+            ("of the roofline", geometric(rows, |s| s.roofline), 0.95),
+            (
+                "of the overhead removed",
+                mean(rows, |s| s.overhead_removed),
+                0.9,
+            ),
+        ] {
+            all += 1;
+            if value.is_nan() || value < least {
+                let metric = metric.name();
+                missed.push(format!(
+                    "missed: {metric}, {name}: {:.1} % {what}, not {:.0}",
+                    100.0 * value,
+                    100.0 * least
+                ));
+            }
+        }
+    }
+    println!();
+    for line in judged.iter().chain(&missed) {
+        println!("{line}");
+    }
+    println!("goals: {} of {all} met", all - missed.len());
+    Ok(())
+}
+
+/// For each method, by name, all of its predictions.
+type Scores = Vec<(&'static str, Vec<Score>)>;
+
+fn scores(folder: &Path, metric: Metric, seed: u64) -> Result<Scores, Box<dyn Error>> {
+    let (problems, states, features) = (problems(folder)?, states(folder)?, features()?);
+    let tables = |kind| -> Result<Vec<Table>, Box<dyn Error>> {
+        problems
+            .iter()
+            .map(|problem| Table::new(kind, problem))
+            .collect()
+    };
+    let (printed, canonical) = (tables(SpaceKind::Printed)?, tables(SpaceKind::Canonical)?);
+    let methods = methods();
+    let mut scores: Scores = methods
+        .iter()
+        .map(|method| (method.0, Vec::new()))
+        .collect();
+    let mut draw = draws(seed);
+    for repeat in (0..REPEATS).map(|repeat| seed * REPEATS + repeat) {
+        let cases = problems
+            .iter()
+            .map(|problem| Case::new(problem, &states[&problem.name], metric, repeat))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut order: Vec<usize> = (0..cases.len()).collect();
+        for last in (1..order.len()).rev() {
+            order.swap(last, draw(last + 1));
+        }
+        let (known, asked) = order.split_at(cases.len() * 4 / 5);
+        for &index in asked {
+            let case = &cases[index];
+            let answers = methods
+                .iter()
+                .map(|&(_, space, method)| {
+                    let tables = match space {
+                        SpaceKind::Printed => &printed,
+                        SpaceKind::Canonical => &canonical,
+                    };
+                    let known: Vec<_> = known.iter().map(|&k| (&cases[k], &tables[k])).collect();
+                    method.answer(&features, &known, (case, &tables[index]), metric, repeat)
+                })
+                .collect::<Result<Vec<Answer>, _>>()?;
+            let kept = answers.iter().map(|answer| answer.kept);
+            let best = kept.fold(case.roofline, f64::min);
+            let scene_known = known
+                .iter()
+                .any(|&k| cases[k].state.scene == case.state.scene);
+            for ((_, scores), answer) in scores.iter_mut().zip(&answers) {
+                scores.push(judge(case, answer, best, scene_known, metric));
+            }
+        }
+    }
+    Ok(scores)
+}
+
+fn judge(case: &Case, answer: &Answer, best: f64, scene_known: bool, metric: Metric) -> Score {
+    let frames = FRAMES as f64;
+    let probes: f64 = answer.probes.iter().sum();
+    let paid = probes + (frames - answer.probes.len() as f64) * answer.kept;
+    // N frames: paid + (N − 80)·roofline of the search, and as much with what was predicted.
+    let lead = case.paid - paid;
+    let loss = answer.kept - case.roofline;
+    let break_even = if lead <= 0.0 {
+        frames
+    } else if loss <= 0.0 {
+        f64::INFINITY
+    } else {
+        frames + lead / loss
+    };
+    Score {
+        scene: case.state.scene.clone(),
+        search_loss: case.roofline / case.problem.best(metric),
+        scene_known,
+        speed_up: case.paid / paid,
+        roofline: case.roofline / answer.kept,
+        overhead_removed: 1.0 - (paid - frames * best) / (case.paid - frames * best),
+        break_even,
+    }
+}
+
+/// Prints the table of a metric; the index of the method that removes most of the overhead.
+fn print(metric: Metric, scores: &Scores) -> usize {
+    println!(
+        "\n{}: {} predictions each; geometric means, overhead arithmetic",
+        metric.name(),
+        scores[0].1.len()
+    );
+    println!(
+        "what a search of {FRAMES} frames finds ÷ second best of the table: {:.3}",
+        geometric(&scores[0].1, |s| s.search_loss)
+    );
+    println!(
+        "{:38} speed-up | roofline % worst, scene known, unknown | overhead removed % worst, best scene | break-even median, never %",
+        ""
+    );
+    let mut best = (f64::NEG_INFINITY, 0);
+    let fixed: Vec<bool> = methods().iter().map(|method| method.2.is_fixed()).collect();
+    for (index, (name, rows)) in scores.iter().enumerate() {
+        let overhead = mean(rows, |s| s.overhead_removed);
+        if !fixed[index] && overhead > best.0 {
+            best = (overhead, index);
+        }
+        let (known, unknown): (Vec<Score>, Vec<Score>) =
+            rows.iter().cloned().partition(|s| s.scene_known);
+        let least = |of: fn(&Score) -> f64| rows.iter().map(of).fold(f64::INFINITY, f64::min);
+        let mut frames: Vec<f64> = rows.iter().map(|s| s.break_even).collect();
+        frames.sort_by(f64::total_cmp);
+        let never = frames.iter().filter(|frames| frames.is_infinite()).count();
+        println!(
+            "{name:38} {:8.2} | {:8.1} {:6.1} {:>6} {:>6} | {:8.1} {:7.1} {:6.1} | {:8.0} {:4.0}",
+            geometric(rows, |s| s.speed_up),
+            100.0 * geometric(rows, |s| s.roofline),
+            100.0 * least(|s| s.roofline),
+            percent(&known),
+            percent(&unknown),
+            100.0 * overhead,
+            100.0 * least(|s| s.overhead_removed),
+            100.0 * best_scene(rows),
+            frames[frames.len() / 2],
+            100.0 * never as f64 / frames.len() as f64,
+        );
+    }
+    best.1
+}
+
+/// The roofline ratio of some predictions, of which there may be none.
+fn percent(rows: &[Score]) -> String {
+    if rows.is_empty() {
+        return "none".into();
+    }
+    format!("{:.1}", 100.0 * geometric(rows, |s| s.roofline))
+}
+
+/// The mean overhead removed in the scene where that is most.
+fn best_scene(rows: &[Score]) -> f64 {
+    let mut scenes: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for row in rows {
+        let scene = scenes.entry(&row.scene).or_default();
+        scene.push(row.overhead_removed);
+    }
+    let means = scenes
+        .values()
+        .map(|values| values.iter().sum::<f64>() / values.len() as f64);
+    means.fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn mean(rows: &[Score], of: impl Fn(&Score) -> f64) -> f64 {
+    rows.iter().map(of).sum::<f64>() / rows.len() as f64
+}
+
+fn geometric(rows: &[Score], of: impl Fn(&Score) -> f64) -> f64 {
+    mean(rows, |row| of(row).ln()).exp()
+}
+
+/// Numbers below a bound, the same ones for the same seed.
+fn draws(seed: u64) -> impl FnMut(usize) -> usize {
+    let mut state = seed.wrapping_add(1);
+    move |bound| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % bound
+    }
+}

@@ -1,0 +1,120 @@
+//! A recorded problem and the paper's search on it: what a predictor learns from and is compared with.
+
+use std::error::Error;
+
+use raywright_tuner::{Config, Outcome, Space, Tuner, replay::Pool, search_by_name};
+
+use crate::{
+    problems::{Metric, Problem},
+    spaces::SpaceKind,
+    states::State,
+};
+
+/// Frames of a search.
+pub(crate) const FRAMES: usize = 80;
+
+/// The rows of a problem as points of a space.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    pub(crate) points: Vec<Vec<f64>>,
+}
+
+impl Table {
+    pub(crate) fn new(kind: SpaceKind, problem: &Problem) -> Result<Table, Box<dyn Error>> {
+        let space = kind.space()?;
+        let configs = configs(kind, &space, problem)?;
+        let points = configs.iter().map(|config| space.encode(config)).collect();
+        Ok(Table { points })
+    }
+
+    /// The row nearest to a point: what is predicted need not have been measured here.
+    pub(crate) fn nearest(&self, point: &[f64]) -> usize {
+        let distance = |row: &usize| -> f64 {
+            let pairs = self.points[*row].iter().zip(point);
+            pairs.map(|(a, b)| (a - b) * (a - b)).sum()
+        };
+        let rows = 0..self.points.len();
+        rows.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(0)
+    }
+}
+
+fn configs(
+    kind: SpaceKind,
+    space: &Space,
+    problem: &Problem,
+) -> Result<Vec<Config>, Box<dyn Error>> {
+    let configs = problem.rows.iter().map(|(row, _)| kind.config(space, row));
+    Ok(configs.collect::<Result<_, _>>()?)
+}
+
+/// A problem and one search on it.
+#[derive(Clone, Debug)]
+pub(crate) struct Case<'a> {
+    pub(crate) problem: &'a Problem,
+    pub(crate) state: &'a State,
+    /// Rows that the search measured, and their costs.
+    pub(crate) samples: Vec<(usize, f64)>,
+    /// Sum of the costs of its frames.
+    pub(crate) paid: f64,
+    /// The least cost that it saw: the paper's roofline.
+    pub(crate) roofline: f64,
+}
+
+impl<'a> Case<'a> {
+    /// Latin hypercube and simplex in the printed space.
+    pub(crate) fn new(
+        problem: &'a Problem,
+        state: &'a State,
+        metric: Metric,
+        seed: u64,
+    ) -> Result<Case<'a>, Box<dyn Error>> {
+        let kind = SpaceKind::Printed;
+        let space = kind.space()?;
+        let configs = configs(kind, &space, problem)?;
+        let outcomes = problem.rows.iter().map(|(_, costs)| match costs {
+            Some(costs) => Outcome::Done {
+                cost: costs[metric as usize],
+            },
+            None => Outcome::Failed {
+                reason: "the depth limit was reached".into(),
+            },
+        });
+        let mut pool = Pool::new(&space, configs.iter().cloned().zip(outcomes));
+        let search = search_by_name("nelder-mead").ok_or("no such search")?;
+        let mut tuner = Tuner::new(space, search, seed);
+        let (mut paid, mut roofline) = (0.0, f64::INFINITY);
+        for _ in 0..FRAMES {
+            let trial = tuner.ask();
+            let answer = pool.answer(&mut tuner, &trial)?;
+            let (outcome, _) = answer.ok_or("the pool is empty")?;
+            match outcome {
+                Outcome::Done { cost } => {
+                    roofline = roofline.min(cost);
+                    paid += cost;
+                }
+                // A build that is refused costs a frame with what there is, the weak default at first.
+                _ => paid += roofline.min(1.0),
+            }
+        }
+        let mut samples = Vec::new();
+        for record in tuner.records() {
+            let row = configs.iter().position(|config| *config == record.config);
+            let row = row.ok_or("a record that is no row")?;
+            samples.extend(record.costs.iter().map(|&cost| (row, cost)));
+        }
+        Ok(Case {
+            problem,
+            state,
+            samples,
+            paid,
+            roofline,
+        })
+    }
+
+    /// The cost of a row; where its build was refused that of the weak default, which then stands in.
+    pub(crate) fn cost(&self, row: usize, metric: Metric) -> f64 {
+        let costs = self.problem.rows[row].1;
+        costs.map_or(1.0, |costs| costs[metric as usize])
+    }
+}
