@@ -1,20 +1,27 @@
 //! `raywright volume evaluate`: how well frame times are predicted and steered, in several ways.
 
-use std::{collections::BTreeMap, fmt::Write, fs, path::PathBuf};
+mod goals;
+
+use std::{
+    fmt::Write as _,
+    fs::{self, File},
+    io::Write as _,
+    path::PathBuf,
+};
 
 use clap::{Args, ValueEnum};
 use comfy_table::{CellAlignment, Table, presets};
 use raywright::{
     report::timeline::{Timeline, TimelineHeader, timeline_page},
-    study::steering::{
-        Caster, Clock, Run, Seam, Stage, Summary, Way, run as lead, suitable_target,
-    },
+    study::steering::{Caster, Clock, Run, Stage, Summary, Way, run as lead, suitable_target},
     volume::{
         Estimator, Raycaster,
         sequence::script::{Start, thirty_seconds},
         steer::Resolution,
     },
 };
+
+use goals::goals;
 
 use super::{maps::terminations, render::write_picture, script::views, source::VolumeOptions};
 use crate::cli::{
@@ -86,7 +93,10 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         let sequences = args.volumes.len() * args.seeds.len() * 4;
         let bar = output::bar(sequences, "sequences");
         let mut all = Vec::new();
-        for name in &args.volumes {
+        // What is there is kept, whatever comes.
+        let mut table = File::create(folder.join("evaluation.csv"))?;
+        table.write_all(CSV_HEAD.as_bytes())?;
+        'volumes: for name in &args.volumes {
             let options = VolumeOptions::named(name);
             let stage = options.prepare()?;
             let views = views(&options, &stage)?;
@@ -117,7 +127,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
                 }
                 for (start, start_name) in [(Start::Sparse, "sparse"), (Start::Dense, "dense")] {
                     if cancel.is_cancelled() {
-                        return Err(Failure::Interrupted);
+                        break 'volumes;
                     }
                     let mut sequence = thirty_seconds(name, volume, &views, start, seed);
                     sequence.fps = args.fps;
@@ -139,10 +149,13 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
                     bar.inc(1);
                 }
             }
+            table.write_all(csv(&of_volume).as_bytes())?;
             all.push(of_volume);
         }
         bar.finish_and_clear();
-        fs::write(folder.join("evaluation.csv"), csv(&all))?;
+        if all.is_empty() {
+            return Err(Failure::Interrupted);
+        }
         let rows = rows(&all);
         print_table(&rows)?;
         let sentences = goals(args.clock, &all);
@@ -156,7 +169,11 @@ pub(crate) fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         for name in ["evaluation.html", "evaluation.csv"] {
             output::line(folder.join(name).display())?;
         }
-        Ok(())
+        // Interrupted: the volumes before are whole.
+        match all.len() == args.volumes.len() {
+            true => Ok(()),
+            false => Err(Failure::Interrupted),
+        }
     })
 }
 
@@ -256,145 +273,6 @@ fn print_table(rows: &[Vec<String>]) -> Result<(), Failure> {
     output::line(format_args!("{UNITS}\n{table}\n"))
 }
 
-/// By how much goals were missed, and how many were met.
-fn goals(clock: ClockName, all: &[OfVolume]) -> Vec<String> {
-    let mut sentences = Vec::new();
-    let (mut met, mut goals) = (0, 0);
-    let mut goal = |what: &str, limit: f64, value_of: &dyn Fn(&OfVolume) -> f64| {
-        let values: BTreeMap<&str, f64> =
-            all.iter().map(|v| (v.name.as_str(), value_of(v))).collect();
-        let missed: Vec<String> = values
-            .iter()
-            .filter(|(_, value)| value.is_nan() || **value > limit)
-            .map(|(name, value)| format!("{name} {value:.3}"))
-            .collect();
-        goals += 1;
-        if missed.is_empty() {
-            met += 1;
-            return;
-        }
-        sentences.push(format!(
-            "missed: {what} at most {limit}: {}",
-            missed.join(", ")
-        ))
-    };
-    let by = |caster: Caster| {
-        move |volume: &OfVolume, way: Way| summary([volume].into_iter(), caster, way)
-    };
-    let (of, of_hull) = (by(Caster::Map), by(Caster::Hull));
-    match clock {
-        ClockName::Work => {
-            goal("paper, RMSE above the target", 0.13, &|v| {
-                of_hull(v, Way::Paper).rmse_up
-            });
-            goal("paper, largest overshoot", 0.62, &|v| {
-                of_hull(v, Way::Paper).error_up
-            });
-            goal("in parts, RMSE above the target", 0.03, &|v| {
-                of(v, Way::Parts).rmse_up
-            });
-            goal("in parts, largest overshoot", 0.15, &|v| {
-                of(v, Way::Parts).error_up
-            });
-            goal("in parts, frames above 1.1", 0.005, &|v| {
-                of(v, Way::Parts).above_tenth
-            });
-            goal("in parts, step ÷ last frame's", 1.03, &|v| {
-                of(v, Way::Parts).mean_step / of(v, Way::LastFrame).mean_step
-            });
-            goal("in parts, step ÷ two pass's", 1.0 / 1.5, &|v| {
-                of(v, Way::Parts).mean_step / of(v, Way::TwoPass).mean_step
-            });
-            goal("ours, prediction", 0.07, &|v| of(v, Way::Ours).prediction);
-            goal("in parts, prediction", 0.07, &|v| {
-                of(v, Way::Parts).prediction
-            });
-        }
-        ClockName::Wall => {
-            goal("in parts, 95th percentile", 1.05, &|v| {
-                of(v, Way::Parts).percentiles[1]
-            });
-            goal("in parts, largest overshoot", 0.2, &|v| {
-                of(v, Way::Parts).error_up
-            });
-            goal("in parts, 95th percentile of overhead", 0.02, &|v| {
-                of(v, Way::Parts).overhead[1]
-            });
-        }
-    }
-    if clock == ClockName::Work {
-        goals += 1;
-        let (sentence, holds) = order(all);
-        met += usize::from(holds);
-        sentences.push(sentence);
-    }
-    if let Some(sentence) = seams(all) {
-        sentences.push(sentence);
-    }
-    sentences.push(format!("goals: {met} of {goals} met"));
-    sentences
-}
-
-/// The order of the ways in Table 1 of the paper, in ours with its caster, and whether it is the same: times
-/// above the target are larger by the last frame than by prediction; two pass has hardly a slow frame, and
-/// the longest steps. (Its root mean square above the target is that of one or two frames, there as here.)
-fn order(all: &[OfVolume]) -> (String, bool) {
-    let of = |volumes: &[OfVolume], way| summary(volumes.iter(), Caster::Hull, way);
-    let holds = |volumes: &[OfVolume]| {
-        let [last, paper, two] =
-            [Way::LastFrame, Way::Paper, Way::TwoPass].map(|way| of(volumes, way));
-        last.rmse_up > paper.rmse_up
-            && two.slow < 0.1 * last.slow.min(paper.slow)
-            && two.mean_step > 1.2 * last.mean_step.max(paper.mean_step)
-    };
-    let own = all
-        .iter()
-        .filter(|v| holds(std::slice::from_ref(v)))
-        .count();
-    let columns = [Way::LastFrame, Way::Paper, Way::TwoPass].map(|way| {
-        let s = of(all, way);
-        format!(
-            "{} {:.1} %, {:.1} % slow, step {:.2}",
-            way.name(),
-            100.0 * s.rmse_up,
-            100.0 * s.slow,
-            s.mean_step
-        )
-    });
-    let together = holds(all);
-    let sentence = format!(
-        "order of Table 1 (RMSE above the target, slow frames, step): {}: {}, and on {own} of {} volumes by themselves",
-        columns.join("; "),
-        if together { "the same" } else { "missed" },
-        all.len()
-    );
-    (sentence, together)
-}
-
-/// How frames in parts differ from frames with one step, where that was looked at.
-fn seams(all: &[OfVolume]) -> Option<String> {
-    let rows = all
-        .iter()
-        .flat_map(|v| &v.runs)
-        .flat_map(|(_, _, run)| &run.frames);
-    let seams: Vec<Seam> = rows.filter_map(|row| row.seam).collect();
-    let count = seams.len();
-    let percentile = |share: usize, of: fn(&Seam) -> f64| {
-        let mut values: Vec<f64> = seams.iter().map(of).collect();
-        values.sort_by(f64::total_cmp);
-        Some(*values.get((count * share / 100).min(count.checked_sub(1)?))?)
-    };
-    let in_8_bits = |share, of| Some(255.0 * percentile(share, of)?);
-    Some(format!(
-        "seams: {count} frames with steps that differ: {:.1} dB in the median and {:.1} in the worst twentieth against one step; at borders {:.2} of 255 in the median (root mean square), {:.2} in the worst twentieth; largest {:.0}",
-        percentile(50, |s| s.decibels)?,
-        percentile(5, |s| s.decibels)?,
-        in_8_bits(50, |s| s.border)?,
-        in_8_bits(95, |s| s.border)?,
-        in_8_bits(100, |s| s.largest)?,
-    ))
-}
-
 /// The page: the table, and the first sequence of every volume frame by frame.
 fn page(
     args: &EvaluateArgs,
@@ -443,35 +321,33 @@ fn page(
     timeline_page(&header, &timelines)
 }
 
+const CSV_HEAD: &str = "volume,caster,sequence,way,time_s,target_s,frame_s,cast_s,preparing_s,overhead_s,predicted_s,step,step_spread,samples,estimated_samples,cost_ratio,is_switch\n";
+
 /// Every frame of every run.
-fn csv(all: &[OfVolume]) -> String {
-    let mut text = String::from(
-        "volume,caster,sequence,way,time_s,target_s,frame_s,cast_s,preparing_s,overhead_s,predicted_s,step,step_spread,samples,estimated_samples,cost_ratio,is_switch\n",
-    );
-    for volume in all {
-        for (caster, sequence, run) in &volume.runs {
-            for f in &run.frames {
-                let _ = writeln!(
-                    text,
-                    "{},{},{sequence},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-                    volume.name,
-                    caster.name(),
-                    run.way.name().replace(',', ""),
-                    f.time,
-                    run.target,
-                    f.frame_time,
-                    f.cast_time,
-                    f.preparing,
-                    f.overhead,
-                    f.predicted,
-                    f.step,
-                    f.step_spread,
-                    f.samples,
-                    f.estimated,
-                    f.cost_ratio,
-                    f.is_switch,
-                );
-            }
+fn csv(volume: &OfVolume) -> String {
+    let mut text = String::new();
+    for (caster, sequence, run) in &volume.runs {
+        for f in &run.frames {
+            let _ = writeln!(
+                text,
+                "{},{},{sequence},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                volume.name,
+                caster.name(),
+                run.way.name().replace(',', ""),
+                f.time,
+                run.target,
+                f.frame_time,
+                f.cast_time,
+                f.preparing,
+                f.overhead,
+                f.predicted,
+                f.step,
+                f.step_spread,
+                f.samples,
+                f.estimated,
+                f.cost_ratio,
+                f.is_switch,
+            );
         }
     }
     text
