@@ -86,7 +86,7 @@ impl Memory {
                         continue;
                     };
                     Outcome::Done {
-                        cost: metric.cost_of(build, render),
+                        cost: metric.cost(build, render),
                     }
                 }
                 Outcome::Cancelled => continue,
@@ -132,7 +132,7 @@ impl Memory {
             }
             Some(Ok(FrameTimes { build, render })) => {
                 let times = [build.as_secs_f64(), render.as_secs_f64()];
-                let cost = metric.cost_of(times[0], times[1]);
+                let cost = metric.cost(times[0], times[1]);
                 let done = TrialOutcome::new(trial, Outcome::Done { cost });
                 MEASURES
                     .iter()

@@ -27,7 +27,7 @@ const SLOW_BUILD: u32 = 3;
 /// What a configuration took.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// Its tree; `None` if it could not be built, with the reason.
+    /// Its tree, or why it could not be built.
     pub tree: Result<RecordedTree, BuildError>,
     /// The last build of the reference.
     pub reference_build: Duration,

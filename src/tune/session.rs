@@ -6,7 +6,7 @@
 //! trial takes longer than [`SLOWEST_TRIAL`] times a frame with default parameters: a tree that
 //! the depth limit has robbed of its heuristic can be a thousand times slower.
 
-use std::time::Duration;
+use std::{ops::Add, time::Duration};
 
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
 use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
@@ -52,18 +52,9 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// The cost of a frame.
+    /// The cost of a frame, in the unit of its times.
     #[must_use]
-    pub fn cost(self, build: Duration, render: Duration) -> Duration {
-        match self {
-            Self::Render => render,
-            Self::Total => build + render,
-        }
-    }
-
-    /// The same in seconds.
-    #[must_use]
-    pub fn cost_of(self, build: f64, render: f64) -> f64 {
+    pub fn cost<T: Add<Output = T>>(self, build: T, render: T) -> T {
         match self {
             Self::Render => render,
             Self::Total => build + render,
