@@ -46,7 +46,7 @@ pub use error::PredictError;
 pub use features::{Feature, Features, Scaling, Subject};
 pub use least_squares::{LeastSquares, Terms};
 pub use nearest::NearestNeighbour;
-pub use policy::{EpsilonGreedy, Feedback, PolicySettings, Step};
+pub use policy::{EpsilonGreedy, PolicySettings, Step};
 pub use portfolio::{Portfolio, greedy_members};
 pub use radial::{Kernel, RadialBasis, RadialSettings, Reward, StepSize};
 

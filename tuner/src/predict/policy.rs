@@ -17,35 +17,6 @@ use super::features::squared_distance;
 use super::{Features, PredictError, Predictor, Scaling, Subject, check_range};
 use crate::rng::Stream;
 
-/// What is to be short.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Feedback {
-    /// The time to render: a tree is built once and a picture refined.
-    Progressive,
-    /// The time to build and to render: a tree for every frame.
-    RealTime,
-}
-
-impl Feedback {
-    /// The cost of a frame from the times that it took to build and to render, in one unit.
-    ///
-    /// # Errors
-    /// [`PredictError::BadCost`] for a time that is negative or not finite, or a cost of 0.
-    pub fn cost(self, build: f64, render: f64) -> Result<f64, PredictError> {
-        for time in [build, render] {
-            if !time.is_finite() || time < 0.0 {
-                return Err(PredictError::BadCost { cost: time });
-            }
-        }
-        let cost = match self {
-            Feedback::Progressive => render,
-            Feedback::RealTime => build + render,
-        };
-        super::check_cost(cost)?;
-        Ok(cost)
-    }
-}
-
 /// Settings of [`EpsilonGreedy`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -315,15 +286,5 @@ mod tests {
         ] {
             assert!(EpsilonGreedy::new(features(), settings, 1).is_err());
         }
-    }
-
-    #[test]
-    fn feedback_worked_by_hand() {
-        assert_eq!(Feedback::Progressive.cost(3.0, 2.0), Ok(2.0));
-        assert_eq!(Feedback::RealTime.cost(3.0, 2.0), Ok(5.0));
-        assert_eq!(Feedback::RealTime.cost(3.0, 0.0), Ok(3.0));
-        assert!(Feedback::Progressive.cost(3.0, 0.0).is_err());
-        assert!(Feedback::Progressive.cost(f64::NAN, 1.0).is_err());
-        assert!(Feedback::RealTime.cost(-1.0, 2.0).is_err());
     }
 }
