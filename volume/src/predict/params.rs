@@ -69,7 +69,7 @@ impl PredictorParams {
         }
     }
 
-    /// Ours: scaled features, logarithms, forgetting, a learned correction of the estimate, the speed
+    /// Ours: scaled features, forgetting, a learned correction of the estimate, the speed
     /// of the machine apart, and the additive model where frames are unlike any before.
     #[must_use]
     pub fn plus() -> Self {
@@ -77,7 +77,7 @@ impl PredictorParams {
         Self {
             features: FeatureForm::Scaled(FeatureScales::default()),
             cost: Some(krls.with_forgetting(0.98)),
-            target: CostTarget::LogRatio,
+            target: CostTarget::Cost,
             unit: SampleUnit::Weighted,
             bias: Some(krls.with_forgetting(0.98)),
             speed_memory: Some(5.0),

@@ -7,7 +7,7 @@
 //! that is, the more parts the better.
 //!
 //! Invariants: a step is on a ladder of sixteenths of an octave from that of the frame, at most half an octave
-//! shorter and two octaves longer, and within its limits; equal times give equal steps.
+//! shorter and four octaves longer, and within its limits; equal times give equal steps.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ const RUNGS: f64 = 16.0;
 
 /// Octaves from the step of the frame to the shortest and the longest of its parts.
 const FINEST: f64 = -0.5;
-const COARSEST: f64 = 2.0;
+const COARSEST: f64 = 4.0;
 
 /// The time of the prediction that measured times are weighed against, as a share of the frame.
 const TRUST: f64 = 1.0 / 32.0;
@@ -325,7 +325,7 @@ mod tests {
     fn steps_stay_on_their_ladder() {
         for wrong in [0.01, 100.0, f64::INFINITY, f64::NAN] {
             let (_, inside) = lead(0.95, 0.9, |_| wrong);
-            assert!(inside.steps().iter().all(|step| (0.5..=4.0).contains(step)));
+            assert!(inside.steps().iter().all(|step| (0.5..=8.0).contains(step)));
         }
     }
 
