@@ -49,6 +49,7 @@
 
 mod axis;
 mod canon;
+mod change;
 mod config;
 pub mod conformance;
 mod error;
@@ -66,6 +67,7 @@ mod trial;
 mod tuner;
 
 pub use canon::CanonRule;
+pub use change::ChangeDetector;
 pub use config::{Config, Value};
 pub use error::{SpaceError, TellError};
 pub use param::{Condition, Kind, Param, Scale};

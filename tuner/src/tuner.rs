@@ -133,6 +133,30 @@ impl Tuner {
         self.ask_without_search()
     }
 
+    /// A trial of a configuration that the user wants to be measured, once more as a rule.
+    ///
+    /// # Panics
+    ///
+    /// If `config` is not a configuration of the space, see [`Space::check`].
+    pub fn ask_for(&mut self, config: &Config) -> Trial {
+        if let Err(error) = self.space.check(config) {
+            panic!("not a configuration of this space: {error}");
+        }
+        let canonical = self.space.canonical(config);
+        self.hand_out(config.clone(), canonical, Origin::Tuner, Reason::Replicate)
+    }
+
+    /// By which share of the least cost the last proposal of the search is expected to be better; `None` if
+    /// the search has no idea of it, or measures something for another reason.
+    pub fn expected_gain(&self) -> Option<f64> {
+        self.search.expected_gain()
+    }
+
+    /// Whether given starts are left to be asked.
+    pub fn has_starts(&self) -> bool {
+        !self.starts.is_empty()
+    }
+
     /// Ends a trial. An error leaves the tuner as it was.
     ///
     /// # Errors

@@ -65,6 +65,12 @@ pub trait Search: Debug + Send {
 
     /// The proposal `ticket` will not be observed; the search may propose it again.
     fn withdraw(&mut self, ticket: u64);
+
+    /// By which share of the least cost the last proposal is expected to be better, if the search has an idea
+    /// of it: a search whose proposals promise nothing may end.
+    fn expected_gain(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// Names of all searches.

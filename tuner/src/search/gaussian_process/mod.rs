@@ -71,6 +71,8 @@ pub struct GaussianProcess {
     lengths: Vec<usize>,
     next_axis: usize,
     proposals: u64,
+    /// The improvement of the logarithm that is expected of the last proposal.
+    expected_gain: Option<f64>,
 }
 
 /// An observed point.
@@ -97,6 +99,7 @@ impl GaussianProcess {
             lengths: Vec::new(),
             next_axis: 0,
             proposals: 0,
+            expected_gain: None,
         }
     }
 
@@ -234,8 +237,8 @@ impl GaussianProcess {
         (good / all).max(1e-3)
     }
 
-    /// The point at which the most is expected, and its expected value.
-    fn most_promising(&mut self) -> Option<(Vec<f64>, f64)> {
+    /// The point at which the most is expected, its expected value, and the logarithm of what is expected.
+    fn most_promising(&mut self) -> Option<(Vec<f64>, f64, f64)> {
         let best = self.best()?.value?;
         let model = self.model()?;
         let mut chosen: Option<(f64, Vec<f64>, f64)> = None;
@@ -251,7 +254,7 @@ impl GaussianProcess {
                 chosen = Some((merit, point, prediction.mean));
             }
         }
-        chosen.map(|(_, point, mean)| (point, mean))
+        chosen.map(|(merit, point, mean)| (point, mean, merit))
     }
 
     /// Lets go of the point that tells least: a poor one with a near neighbour.
@@ -315,6 +318,7 @@ impl Search for GaussianProcess {
 
     fn propose(&mut self, ticket: u64) -> Proposal {
         self.proposals += 1;
+        self.expected_gain = None;
         let proposal = |point: Vec<f64>, samples, step| Proposal {
             point,
             samples,
@@ -336,7 +340,10 @@ impl Search for GaussianProcess {
             return proposal(point, samples, "replicate");
         }
         let (point, value, step) = match self.most_promising() {
-            Some((point, value)) => (point, Some(value), "improve"),
+            Some((point, value, merit)) => {
+                self.expected_gain = Some(merit.exp());
+                (point, Some(value), "improve")
+            }
             None => {
                 let point = self.stream.point(self.bins.len());
                 (self.snapped(point), None, "explore")
@@ -377,6 +384,10 @@ impl Search for GaussianProcess {
 
     fn withdraw(&mut self, ticket: u64) {
         self.open.remove(&ticket);
+    }
+
+    fn expected_gain(&self) -> Option<f64> {
+        self.expected_gain
     }
 }
 
@@ -429,6 +440,21 @@ mod tests {
                 assert_ne!(a, b);
             }
         }
+    }
+
+    #[test]
+    fn less_is_promised_as_more_is_known() {
+        let mut search = search(4);
+        let mut promised = Vec::new();
+        for ticket in 0..60 {
+            let point = search.propose(ticket).point;
+            promised.extend(search.expected_gain());
+            search.observe(Some(ticket), &point, told(cost(&point)));
+        }
+        let mean = |gains: &[f64]| gains.iter().sum::<f64>() / gains.len() as f64;
+        let (first, last) = (&promised[..5], &promised[promised.len() - 5..]);
+        assert!(mean(last) < 0.2 * mean(first), "{promised:?}");
+        assert!(promised.iter().all(|gain| *gain >= 0.0));
     }
 
     #[test]

@@ -1,0 +1,288 @@
+//! Whether another tree is faster, from some tiles of one frame.
+//!
+//! No configuration changes a pixel, so that the tiles of a frame may be traced through two trees. Some tiles
+//! are traced through a candidate, as many through the incumbent; what each is expected to take with the
+//! incumbent is known from earlier frames. What tiles of the candidate took over what was expected, divided
+//! by the same of the tiles of the incumbent, is the ratio of the two: the speed of the machine at the moment
+//! is in both, and how dear a tile is in neither.
+//!
+//! Ratio estimation and the jackknife over pairs: Cochran, *Sampling Techniques*, 1977, section 6. A probe
+//! goes on with twice as many tiles for as long as it has not decided, up to half of the frame.
+//!
+//! Invariants: a ratio of times that are all multiplied by a number is the same; bounds lie on both sides of
+//! the ratio; no pairs decide nothing.
+
+/// Candidate tiles of the first, second, … part of a probe, as shares of the frame, altogether.
+pub(super) const SHARES: [f64; 4] = [1.0 / 32.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
+
+/// Quantile of the normal distribution of a one-sided bound of 95 %.
+const ONE_SIDED: f64 = 1.645;
+
+/// A candidate is rejected when the lower bound of its cost over that of the incumbent is above this…
+const WORSE: f64 = 1.02;
+/// …or, before more than the first part is rendered, when it is expected to be above this.
+const MUCH_WORSE: f64 = 1.25;
+
+/// Pairs below which bounds are not believed.
+const FEW_PAIRS: usize = 5;
+
+/// Standard deviation of the logarithm of a ratio beside what its pairs show: that of the tree itself, which
+/// lies elsewhere in memory the next time. Paired ratios of whole frames repeat to about this.
+const LEAST_DEVIATION: f64 = 0.003;
+
+/// Two tiles of one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// Seconds of the tile of the candidate, and what it was expected to take with the incumbent.
+    pub candidate: [f64; 2],
+    /// The same of the tile of the incumbent.
+    pub incumbent: [f64; 2],
+}
+
+/// The time of a candidate over that of the incumbent, to render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeRatio {
+    /// The logarithm of the ratio.
+    pub log: f64,
+    /// Its standard deviation.
+    pub deviation: f64,
+    /// Pairs of tiles.
+    pub pairs: usize,
+}
+
+impl ProbeRatio {
+    /// From pairs; `None` if there are none, or times that are no times.
+    #[must_use]
+    pub fn of(pairs: &[Pair]) -> Option<Self> {
+        let sum = |pairs: &mut dyn Iterator<Item = &Pair>| {
+            pairs.fold([0.0; 4], |mut sum, pair| {
+                let [a, b] = pair.candidate;
+                let [c, d] = pair.incumbent;
+                for (sum, value) in sum.iter_mut().zip([a, b, c, d]) {
+                    *sum += value;
+                }
+                sum
+            })
+        };
+        let log = |[a, b, c, d]: [f64; 4]| (a / b).ln() - (c / d).ln();
+        let all = sum(&mut pairs.iter());
+        let own = log(all);
+        if !own.is_finite() {
+            return None;
+        }
+        let count = pairs.len() as f64;
+        let without: Vec<f64> = pairs
+            .iter()
+            .map(|pair| {
+                let one = sum(&mut std::iter::once(pair));
+                log(std::array::from_fn(|i| all[i] - one[i]))
+            })
+            .collect();
+        let mean = without.iter().sum::<f64>() / count;
+        let squares: f64 = without.iter().map(|value| (value - mean).powi(2)).sum();
+        let variance = squares * (count - 1.0) / count;
+        let deviation = if pairs.len() < FEW_PAIRS || !variance.is_finite() {
+            f64::INFINITY
+        } else {
+            variance.sqrt().hypot(LEAST_DEVIATION)
+        };
+        Some(Self {
+            log: own,
+            deviation,
+            pairs: pairs.len(),
+        })
+    }
+
+    /// Both, if they are independent of each other.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        let weights = [self, other].map(|ratio| ratio.deviation.powi(-2));
+        let weight = weights[0] + weights[1];
+        if weight == 0.0 {
+            return other;
+        }
+        Self {
+            log: (self.log * weights[0] + other.log * weights[1]) / weight,
+            deviation: weight.powf(-0.5),
+            pairs: self.pairs + other.pairs,
+        }
+    }
+
+    /// The ratio, and its lower and upper bound of 95 %, each by itself.
+    #[must_use]
+    pub fn bounds(self) -> [f64; 3] {
+        let reach = ONE_SIDED * self.deviation;
+        [self.log, self.log - reach, self.log + reach].map(f64::exp)
+    }
+}
+
+/// What is done with a candidate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Decision {
+    /// It is faster.
+    Accepted,
+    /// It is slower, or not worth more tiles.
+    Rejected,
+    /// Nothing can be said yet.
+    Undecided,
+}
+
+impl Decision {
+    /// Its name in a log.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::Rejected => "rejected",
+            Self::Undecided => "undecided",
+        }
+    }
+}
+
+/// What a frame costs with either tree, seconds: the build's share and rendering with the incumbent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// Of a frame with the incumbent.
+    pub render: f64,
+    /// The share of the build of the incumbent that a frame bears.
+    pub incumbent_build: f64,
+    /// The same of the candidate.
+    pub candidate_build: f64,
+}
+
+impl Costs {
+    /// The cost of the candidate over that of the incumbent, if it renders in `ratio` times the time.
+    #[must_use]
+    pub fn ratio(&self, ratio: f64) -> f64 {
+        (self.candidate_build + ratio * self.render) / (self.incumbent_build + self.render)
+    }
+
+    /// What is to be done with a candidate.
+    #[must_use]
+    pub fn decide(&self, ratio: ProbeRatio) -> Decision {
+        let [expected, lower, upper] = ratio.bounds().map(|bound| self.ratio(bound));
+        if lower > WORSE || (ratio.pairs >= FEW_PAIRS && expected > MUCH_WORSE) {
+            Decision::Rejected
+        } else if upper < 1.0 {
+            Decision::Accepted
+        } else {
+            Decision::Undecided
+        }
+    }
+}
+
+/// Tiles in an order in which each beginning is spread over the picture: multiples of the golden section.
+pub(super) fn spread_order(tiles: usize, frame: u32) -> Vec<usize> {
+    let gcd = |mut a: usize, mut b: usize| {
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let golden = ((tiles as f64) * 0.618_033_988_75) as usize;
+    let stride = (golden.max(1)..).find(|&stride| gcd(stride, tiles) == 1);
+    let stride = stride.unwrap_or(1);
+    // Another beginning for each frame.
+    let begin = (f64::from(frame) * 0.754_877_666_25).fract() * tiles as f64;
+    (0..tiles)
+        .map(|k| (begin as usize + k * stride) % tiles)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tiles of very different cost, on a machine of some speed, with noise in turns.
+    fn pairs(count: usize, ratio: f64, speed: f64, noise: f64) -> Vec<Pair> {
+        (0..count)
+            .map(|i| {
+                let expected = [1.0, 30.0, 7.0, 0.2, 12.0][i % 5];
+                let twin = [9.0, 0.5, 14.0, 25.0][i % 4];
+                let odd = |k: usize| 1.0 + noise * [0.0, 1.0, -1.0, 0.5, -0.6, 0.1, 0.0][k % 7];
+                Pair {
+                    candidate: [expected * ratio * speed * odd(i), expected],
+                    incumbent: [twin * speed * odd(i + 3), twin],
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn speed_of_the_machine_and_dear_tiles_cancel() {
+        for speed in [0.1, 1.0, 7.0] {
+            let ratio = ProbeRatio::of(&pairs(40, 0.8, speed, 0.0)).unwrap();
+            assert!((ratio.log - 0.8_f64.ln()).abs() < 1e-12);
+            assert!((ratio.deviation - LEAST_DEVIATION).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn bounds_hold_the_truth() {
+        let ratio = ProbeRatio::of(&pairs(40, 0.9, 1.0, 0.05)).unwrap();
+        let [middle, lower, upper] = ratio.bounds();
+        assert!(lower < 0.9 && 0.9 < upper && lower < middle && middle < upper);
+        assert!(ratio.deviation < 0.03, "{ratio:?}");
+        // Twice the pairs, less doubt; and so do two probes.
+        let more = ProbeRatio::of(&pairs(160, 0.9, 1.0, 0.05)).unwrap();
+        assert!(more.deviation < 0.7 * ratio.deviation);
+        let both = ratio.and(ratio);
+        assert!((both.deviation - ratio.deviation / 2.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(both.log, ratio.log);
+    }
+
+    #[test]
+    fn few_pairs_or_odd_times_decide_nothing() {
+        let costs = Costs {
+            render: 1.0,
+            incumbent_build: 0.0,
+            candidate_build: 0.0,
+        };
+        assert_eq!(ProbeRatio::of(&[]), None);
+        for count in 1..FEW_PAIRS {
+            let ratio = ProbeRatio::of(&pairs(count, 3.0, 1.0, 0.1)).unwrap();
+            assert_eq!(costs.decide(ratio), Decision::Undecided);
+        }
+        let mut odd = pairs(20, 1.0, 1.0, 0.1);
+        odd[3].candidate[0] = f64::NAN;
+        assert_eq!(ProbeRatio::of(&odd), None);
+    }
+
+    #[test]
+    fn decisions() {
+        let render_only = Costs {
+            render: 1.0,
+            incumbent_build: 0.0,
+            candidate_build: 0.0,
+        };
+        let decide = |costs: Costs, ratio| costs.decide(ProbeRatio::of(&pairs(60, ratio, 1.0, 0.03)).unwrap());
+        assert_eq!(decide(render_only, 0.9), Decision::Accepted);
+        assert_eq!(decide(render_only, 1.0), Decision::Undecided);
+        assert_eq!(decide(render_only, 1.1), Decision::Rejected);
+        // What is saved in rendering is lost in the build.
+        let with_build = Costs {
+            candidate_build: 0.5,
+            incumbent_build: 0.1,
+            ..render_only
+        };
+        assert_eq!(decide(with_build, 0.9), Decision::Rejected);
+        assert!((with_build.ratio(0.6) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_order_is_a_permutation_and_its_beginning_is_spread() {
+        for tiles in [1, 2, 3, 7, 64, 240, 1000] {
+            for frame in [0, 1, 77] {
+                let mut order = spread_order(tiles, frame);
+                if tiles == 240 {
+                    let mut first: Vec<usize> = order[..30].to_vec();
+                    first.sort_unstable();
+                    let gaps = first.windows(2).map(|pair| pair[1] - pair[0]);
+                    assert!(gaps.max() <= Some(16), "{first:?}");
+                }
+                order.sort_unstable();
+                assert!(order.into_iter().eq(0..tiles));
+            }
+        }
+    }
+}
