@@ -208,6 +208,13 @@ impl<'a> TileLoop<'a> {
         }
     }
 
+    /// Number of tiles of a picture.
+    #[must_use]
+    pub fn tiles(&self, width: u32, height: u32) -> usize {
+        let across = |side: u32| side.div_ceil(self.tile_size.get()) as usize;
+        across(width) * across(height)
+    }
+
     /// Calls `render` once for every tile of `film`, in parallel, in no particular order.
     pub fn run<F>(&self, film: &mut Film, render: F) -> Completion
     where

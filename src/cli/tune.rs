@@ -332,7 +332,7 @@ fn frame_record(
     best: Option<f64>,
 ) -> FrameRecord {
     let times = report.outcome.as_ref().ok();
-    let cost_ms = times.map(|times| milliseconds(metric.cost(times.build, times.render)));
+    let cost_ms = times.map(|times| times.cost(metric) * 1e3);
     FrameRecord {
         frame,
         config: tune::described(&report.params),

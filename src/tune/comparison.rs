@@ -9,7 +9,7 @@ use std::time::Duration;
 use raywright_bvh::BuildParams;
 use raywright_imaging::CancelToken;
 
-use super::session::{Clock, FrameTimes, Rendered, Session, SessionError};
+use super::stage::{Clock, FrameTimes, Rendered, SessionError, Stage};
 
 /// A fixed configuration to compare with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,14 +61,9 @@ pub struct Comparison {
     pub rows: Vec<Measurement>,
 }
 
-impl<C: Clock> Session<'_, C> {
-    /// Measures `tuned` beside both baselines for `rounds` rounds, after one that does not count.
-    /// Rounds that were done when `cancel` was set are kept. `progress` is told rounds done and
-    /// rounds to do.
-    ///
-    /// # Errors
-    /// If a baseline cannot be built or the camera cannot be used.
-    pub fn compare(
+impl<C: Clock> Stage<'_, C> {
+    /// Measures `tuned` beside both baselines; see [`Session::compare`](super::Session::compare).
+    pub(super) fn compare(
         &mut self,
         tuned: &BuildParams,
         rounds: usize,
@@ -90,14 +85,9 @@ impl<C: Clock> Session<'_, C> {
             let mut times: Vec<Option<FrameTimes>> = vec![None; rows.len()];
             for turn in 0..rows.len() {
                 let row = (round + turn) % rows.len();
-                let (tree, build) = self
-                    .stage
-                    .build(&rows[row].params)
-                    .map_err(SessionError::Build)?;
-                let rendered = self
-                    .stage
-                    .render(&tree, round as u32, Duration::MAX, cancel)?;
-                self.stage.recycle(tree);
+                let (tree, build) = self.build(&rows[row].params).map_err(SessionError::Build)?;
+                let rendered = self.render(&tree, round as u32, Duration::MAX, cancel)?;
+                self.recycle(tree);
                 let Rendered::Finished { time: render, .. } = rendered else {
                     return Ok(Comparison { rows });
                 };
@@ -119,7 +109,7 @@ impl Measurement {
     pub fn costs_ms(&self, metric: super::Metric) -> Vec<f64> {
         self.rounds
             .iter()
-            .map(|times| milliseconds(metric.cost(times.build, times.render)))
+            .map(|times| times.cost(metric) * 1e3)
             .collect()
     }
 }

@@ -7,20 +7,25 @@
 
 mod canonical;
 mod comparison;
+mod hybrid;
 #[cfg(feature = "store")]
 mod memory;
+mod metric;
 mod portfolio;
+mod probe;
 mod recording;
 mod session;
 mod space;
+mod stage;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
+pub use hybrid::{Candidate, Hybrid, HybridFrame, Probed};
 #[cfg(feature = "store")]
 pub use memory::Memory;
+pub use metric::Metric;
 pub use portfolio::portfolio;
+pub use probe::{Costs, Decision, Pair, ProbeRatio};
 pub use recording::{Recorded, RecordedFrame, RecordedTree, Recorder, random_params};
-pub use session::{
-    Clock, FrameReport, FrameTimes, Metric, SLOWEST_TRIAL, Session, SessionError, Settings,
-    TrialFailure, WallClock,
-};
+pub use session::{FrameReport, SLOWEST_TRIAL, Session, TrialFailure};
 pub use space::{ParameterSpace, SpaceAxes, SpaceFault, described};
+pub use stage::{Clock, FrameTimes, SessionError, Settings, WallClock};

@@ -116,6 +116,9 @@ impl ProbeRatio {
     }
 }
 
+/// Standard deviation of the time of one build, as a share: 6 to 8 % for single builds on a shared machine.
+const BUILD_DEVIATION: f64 = 0.06;
+
 /// What is done with a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
@@ -146,7 +149,7 @@ pub struct Costs {
     pub render: f64,
     /// The share of the build of the incumbent that a frame bears.
     pub incumbent_build: f64,
-    /// The same of the candidate.
+    /// The same of the candidate, measured once.
     pub candidate_build: f64,
 }
 
@@ -157,10 +160,24 @@ impl Costs {
         (self.candidate_build + ratio * self.render) / (self.incumbent_build + self.render)
     }
 
+    /// The cost of the candidate over that of the incumbent, and its lower and upper bound of 95 %, each by
+    /// itself.
+    #[must_use]
+    pub fn bounds(&self, ratio: ProbeRatio) -> [f64; 3] {
+        let [expected, lower, upper] = ratio.bounds().map(|bound| self.ratio(bound));
+        let build = ONE_SIDED * BUILD_DEVIATION * self.candidate_build
+            / (self.incumbent_build + self.render);
+        [
+            expected,
+            expected - (expected - lower).hypot(build),
+            expected + (upper - expected).hypot(build),
+        ]
+    }
+
     /// What is to be done with a candidate.
     #[must_use]
     pub fn decide(&self, ratio: ProbeRatio) -> Decision {
-        let [expected, lower, upper] = ratio.bounds().map(|bound| self.ratio(bound));
+        let [expected, lower, upper] = self.bounds(ratio);
         if lower > WORSE || (ratio.pairs >= FEW_PAIRS && expected > MUCH_WORSE) {
             Decision::Rejected
         } else if upper < 1.0 {
@@ -255,7 +272,9 @@ mod tests {
             incumbent_build: 0.0,
             candidate_build: 0.0,
         };
-        let decide = |costs: Costs, ratio| costs.decide(ProbeRatio::of(&pairs(60, ratio, 1.0, 0.03)).unwrap());
+        let decide = |costs: Costs, ratio| {
+            costs.decide(ProbeRatio::of(&pairs(60, ratio, 1.0, 0.03)).unwrap())
+        };
         assert_eq!(decide(render_only, 0.9), Decision::Accepted);
         assert_eq!(decide(render_only, 1.0), Decision::Undecided);
         assert_eq!(decide(render_only, 1.1), Decision::Rejected);

@@ -13,7 +13,7 @@ use raywright_tuner::{Outcome, Random, Tuner};
 
 use super::{
     ParameterSpace, SLOWEST_TRIAL, SessionError, Settings,
-    session::{Clock, Rendered, Stage},
+    stage::{Clock, Rendered, Stage},
 };
 
 /// The tree of the reference is built once more after so many configurations.

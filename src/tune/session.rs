@@ -6,14 +6,18 @@
 //! trial takes longer than [`SLOWEST_TRIAL`] times a frame with default parameters: a tree that
 //! the depth limit has robbed of its heuristic can be a thousand times slower.
 
-use std::{ops::Add, time::Duration};
+use std::time::Duration;
 
-use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
-use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
-use raywright_tracer::{Integrator, Rgb, Shot, World};
-use raywright_tuner::{Config, Outcome, Search, TellError, Trial, Tuner};
+use raywright_bvh::{BuildError, BuildParams};
+use raywright_imaging::{Camera, CancelToken, Film};
+use raywright_tracer::World;
+use raywright_tuner::{Config, Outcome, Search, Trial, Tuner};
 
-use super::space::{ParameterSpace, SpaceFault};
+use super::{
+    comparison::Comparison,
+    space::{ParameterSpace, SpaceFault},
+    stage::{Clock, FrameTimes, Rendered, SessionError, Settings, Stage, add_frame},
+};
 
 /// Trials are given up after so many times the render time of the default parameters.
 pub const SLOWEST_TRIAL: u32 = 10;
@@ -51,15 +55,6 @@ impl std::fmt::Display for TrialFailure {
     }
 }
 
-/// How long a frame took.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameTimes {
-    /// Time to build the tree.
-    pub build: Duration,
-    /// Time to render one sample per pixel.
-    pub render: Duration,
-}
-
 /// A tuning run.
 #[derive(Debug)]
 pub struct Session<'a, C> {
@@ -86,14 +81,11 @@ impl<'a, C: Clock> Session<'a, C> {
         search: Box<dyn Search>,
         clock: C,
     ) -> Result<Self, SessionError> {
-        camera.validate().map_err(SessionError::Camera)?;
-        let film = Film::new(settings.width, settings.height).map_err(SessionError::Film)?;
-        if !settings.isa.is_available() {
-            return Err(SessionError::Isa(settings.isa));
-        }
+        let stage = Stage::checked(world, camera, settings, clock)?;
+        let film = stage.film()?;
         let tuner = Tuner::new(space.space().clone(), search, settings.seed);
         Ok(Self {
-            stage: Stage::new(world, camera, settings, clock),
+            stage,
             space,
             tuner,
             film,
@@ -203,13 +195,9 @@ impl<'a, C: Clock> Session<'a, C> {
         };
         let (outcome, told) = match trial_result {
             Ok((film, times)) => {
-                self.add(&film);
-                let cost = self
-                    .stage
-                    .settings
-                    .metric
-                    .cost(times.build, times.render)
-                    .as_secs_f64();
+                add_frame(&mut self.film, &film);
+                self.finished += 1;
+                let cost = times.cost(self.stage.settings.metric);
                 (Ok(times), Outcome::Done { cost })
             }
             Err(failure) => {
@@ -228,17 +216,20 @@ impl<'a, C: Clock> Session<'a, C> {
         }))
     }
 
-    /// Adds the samples of a finished frame to the picture.
-    fn add(&mut self, frame: &Film) {
-        let completion = TileLoop::new().run(&mut self.film, |tile, view| {
-            for (x, y) in tile.pixels() {
-                // One sample: its mean is the sample, and f32 again.
-                let sample = frame.pixel(x, y).mean().map(|channel| channel as f32);
-                view.pixel_mut(x, y).add(Rgb::from(sample));
-            }
-        });
-        debug_assert_eq!(completion, Completion::Finished);
-        self.finished += 1;
+    /// Measures `tuned` beside both baselines for `rounds` rounds, after one that does not count.
+    /// Rounds that were done when `cancel` was set are kept. `progress` is told rounds done and
+    /// rounds to do.
+    ///
+    /// # Errors
+    /// If a baseline cannot be built or the camera cannot be used.
+    pub fn compare(
+        &mut self,
+        tuned: &BuildParams,
+        rounds: usize,
+        cancel: &CancelToken,
+        progress: impl Fn(usize, usize),
+    ) -> Result<Comparison, SessionError> {
+        self.stage.compare(tuned, rounds, cancel, progress)
     }
 
     /// The space that is searched.

@@ -3,12 +3,17 @@
 //! Invariants: a frame is a function of seed and sample number, whatever trees its tiles are traced
 //! through; the clock is an argument.
 
-use std::time::Duration;
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
 
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
 use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
-use raywright_tracer::{Integrator, Shot, World};
+use raywright_tracer::{Integrator, Rgb, Shot, World};
 use raywright_tuner::TellError;
+
+use super::{metric::Metric, space::SpaceFault};
 
 /// Tells how much time has passed since some moment.
 pub trait Clock: Sync {
@@ -65,6 +70,8 @@ pub enum SessionError {
     Build(BuildError),
     /// The tuner refused a measurement.
     Tell(TellError),
+    /// Parameters have no place in the space.
+    Space(SpaceFault),
     /// The instruction set is not available on this machine.
     Isa(raywright_bvh::Isa),
 }
@@ -77,12 +84,30 @@ impl std::fmt::Display for SessionError {
             Self::Film(error) => error.fmt(f),
             Self::Build(error) => error.fmt(f),
             Self::Tell(error) => error.fmt(f),
+            Self::Space(fault) => fault.fmt(f),
             Self::Isa(isa) => write!(f, "this machine does not have the instruction set {isa}"),
         }
     }
 }
 
 impl std::error::Error for SessionError {}
+
+/// How long a frame took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameTimes {
+    /// Time to build the tree.
+    pub build: Duration,
+    /// Time to render one sample per pixel.
+    pub render: Duration,
+}
+
+impl FrameTimes {
+    /// What it costs, in seconds.
+    #[must_use]
+    pub fn cost(&self, metric: Metric) -> f64 {
+        metric.cost(self.build.as_secs_f64(), self.render.as_secs_f64())
+    }
+}
 
 /// Where frames are rendered: everything but the search.
 #[derive(Debug)]
@@ -95,6 +120,30 @@ pub(super) struct Stage<'a, C> {
 }
 
 impl<'a, C: Clock> Stage<'a, C> {
+    /// A stage.
+    ///
+    /// # Errors
+    /// If camera, picture size or instruction set cannot be used.
+    pub(super) fn checked(
+        world: &'a World,
+        camera: Camera,
+        settings: Settings,
+        clock: C,
+    ) -> Result<Self, SessionError> {
+        camera.validate().map_err(SessionError::Camera)?;
+        if !settings.isa.is_available() {
+            return Err(SessionError::Isa(settings.isa));
+        }
+        let stage = Self::new(world, camera, settings, clock);
+        stage.film()?;
+        Ok(stage)
+    }
+
+    /// Shows another scene from now on.
+    pub(super) fn show(&mut self, world: &'a World, camera: Camera) {
+        (self.world, self.camera) = (world, camera);
+    }
+
     /// A stage; camera and instruction set have been looked at.
     pub(super) fn new(world: &'a World, camera: Camera, settings: Settings, clock: C) -> Self {
         Self {
@@ -123,6 +172,23 @@ impl<'a, C: Clock> Stage<'a, C> {
         tree.recycle(&mut self.workspace);
     }
 
+    /// A shot of the frame.
+    fn shot(&self) -> Shot<'a> {
+        Shot {
+            world: self.world,
+            camera: self.camera,
+            integrator: Integrator::Path {
+                path_length: self.settings.path_length,
+            },
+            seed: self.settings.seed,
+        }
+    }
+
+    /// An empty film.
+    pub(super) fn film(&self) -> Result<Film, SessionError> {
+        Film::new(self.settings.width, self.settings.height).map_err(SessionError::Film)
+    }
+
     /// Renders one sample of every pixel into a film of its own.
     pub(super) fn render(
         &self,
@@ -131,19 +197,10 @@ impl<'a, C: Clock> Stage<'a, C> {
         limit: Duration,
         cancel: &CancelToken,
     ) -> Result<Rendered, SessionError> {
-        let shot = Shot {
-            world: self.world,
-            camera: self.camera,
-            integrator: Integrator::Path {
-                path_length: self.settings.path_length,
-            },
-            seed: self.settings.seed,
-        };
-        let mut film =
-            Film::new(self.settings.width, self.settings.height).map_err(SessionError::Film)?;
+        let mut film = self.film()?;
         let stop = CancelToken::new();
         let start = self.clock.now();
-        let completion = shot.render(
+        let completion = self.shot().render(
             &mut film,
             sample..sample + 1,
             &TileLoop::new().with_cancel(&stop),
@@ -161,6 +218,60 @@ impl<'a, C: Clock> Stage<'a, C> {
             Completion::Cancelled { .. } => Rendered::TooSlow,
         })
     }
+
+    /// The number of tiles of a frame.
+    pub(super) fn tiles(&self) -> usize {
+        TileLoop::new().tiles(self.settings.width, self.settings.height)
+    }
+
+    /// Adds one sample to every pixel of those tiles for which there is a tree; what each took, in seconds.
+    /// After `limit` no further tile is begun, nor after a cancellation.
+    pub(super) fn render_tiles<'t>(
+        &self,
+        film: &mut Film,
+        sample: u32,
+        limit: Duration,
+        cancel: &CancelToken,
+        tree_of: impl Fn(usize) -> Option<&'t Bvh> + Sync,
+    ) -> Result<Vec<(usize, f64)>, SessionError> {
+        let projection = self.camera.projection(film.width(), film.height());
+        let projection = projection.map_err(SessionError::Camera)?;
+        let shot = self.shot();
+        let times = Mutex::new(Vec::new());
+        let begun = self.clock.now();
+        let completion = TileLoop::new().run(film, |tile, view| {
+            let Some(tree) = tree_of(tile.index) else {
+                return;
+            };
+            let start = self.clock.now();
+            if cancel.is_cancelled() || start - begun > limit {
+                return;
+            }
+            shot.render_tile(&projection, tile, view, sample..sample + 1, tree);
+            let time = (self.clock.now() - start).as_secs_f64();
+            let mut times = times.lock().unwrap_or_else(PoisonError::into_inner);
+            times.push((tile.index, time));
+        });
+        debug_assert_eq!(completion, Completion::Finished);
+        Ok(times.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Time since a moment that does not change.
+    pub(super) fn now(&self) -> Duration {
+        self.clock.now()
+    }
+}
+
+/// Adds the samples of a frame to a picture.
+pub(super) fn add_frame(picture: &mut Film, frame: &Film) {
+    let completion = TileLoop::new().run(picture, |tile, view| {
+        for (x, y) in tile.pixels() {
+            // One sample: its mean is the sample, and f32 again.
+            let sample = frame.pixel(x, y).mean().map(|channel| channel as f32);
+            view.pixel_mut(x, y).add(Rgb::from(sample));
+        }
+    });
+    debug_assert_eq!(completion, Completion::Finished);
 }
 
 /// How the rendering of a frame ended.
@@ -170,4 +281,3 @@ pub(super) enum Rendered {
     TooSlow,
     Cancelled,
 }
-

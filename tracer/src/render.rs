@@ -8,10 +8,10 @@ use std::ops::Range;
 
 use raywright_bvh::{Bvh, Ray};
 use raywright_imaging::{
-    camera::{Camera, CameraError},
+    camera::{Camera, CameraError, Projection},
     film::Film,
     sampler::{PixelSampler, dimension},
-    tiles::{Completion, Tile, TileLoop},
+    tiles::{Completion, Tile, TileLoop, TileView},
 };
 
 use crate::{
@@ -46,29 +46,40 @@ impl Shot<'_> {
         tiles: &TileLoop<'_>,
         tree_of: impl Fn(&Tile) -> &'t Bvh + Sync,
     ) -> Result<Completion, CameraError> {
-        let projection = self.camera.projection(film.width(), film.height())?;
+        let pixels = self.camera.projection(film.width(), film.height())?;
         Ok(tiles.run(film, |tile, view| {
-            let bvh = tree_of(tile);
-            for (x, y) in tile.pixels() {
-                let pixel = view.pixel_mut(x, y);
-                for sample in samples.clone() {
-                    let sampler = PixelSampler::new(self.seed, x, y, sample);
-                    let [dx, dy] = sampler.uniform_2d(dimension::FILM);
-                    let direction = projection.direction(x as f32 + dx, y as f32 + dy);
-                    let ray = Ray::new(projection.origin(), direction);
-                    pixel.add(match self.integrator {
-                        Integrator::Path { path_length } => {
-                            integrator::path::radiance(self.world, bvh, ray, &sampler, path_length)
-                        }
-                        Integrator::NaivePath { path_length } => {
-                            integrator::naive::radiance(self.world, bvh, ray, &sampler, path_length)
-                        }
-                        Integrator::View(view) => {
-                            integrator::view::colour(view, self.world, bvh, &ray)
-                        }
-                    });
-                }
-            }
+            self.render_tile(&pixels, tile, view, samples.clone(), tree_of(tile));
         }))
+    }
+
+    /// Adds samples to the pixels of one tile; `projection` is that of the camera for the whole film.
+    pub fn render_tile(
+        &self,
+        projection: &Projection,
+        tile: &Tile,
+        view: &mut TileView<'_, '_>,
+        samples: Range<u32>,
+        tree: &Bvh,
+    ) {
+        for (x, y) in tile.pixels() {
+            let pixel = view.pixel_mut(x, y);
+            for sample in samples.clone() {
+                let sampler = PixelSampler::new(self.seed, x, y, sample);
+                let [dx, dy] = sampler.uniform_2d(dimension::FILM);
+                let direction = projection.direction(x as f32 + dx, y as f32 + dy);
+                let ray = Ray::new(projection.origin(), direction);
+                pixel.add(match self.integrator {
+                    Integrator::Path { path_length } => {
+                        integrator::path::radiance(self.world, tree, ray, &sampler, path_length)
+                    }
+                    Integrator::NaivePath { path_length } => {
+                        integrator::naive::radiance(self.world, tree, ray, &sampler, path_length)
+                    }
+                    Integrator::View(view) => {
+                        integrator::view::colour(view, self.world, tree, &ray)
+                    }
+                });
+            }
+        }
     }
 }

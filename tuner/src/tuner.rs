@@ -78,11 +78,20 @@ impl Tuner {
     /// If `config` is not a configuration of the space, see [`Space::check`].
     #[must_use]
     pub fn with_start(mut self, config: Config) -> Tuner {
+        self.add_start(config);
+        self
+    }
+
+    /// One more known-good configuration, asked after those that are given already.
+    ///
+    /// # Panics
+    ///
+    /// As [`with_start`](Tuner::with_start).
+    pub fn add_start(&mut self, config: Config) {
         if let Err(error) = self.space.check(&config) {
             panic!("not a start of this space: {error}");
         }
         self.starts.push_back(config);
-        self
     }
 
     /// The space that is searched.

@@ -1,0 +1,547 @@
+//! The tuner that never costs a frame: candidates are tried on some tiles, the incumbent keeps the rest.
+//!
+//! The first frame is rendered with given parameters, the strong default as a rule. Then each frame with a
+//! candidate is a [probe](super::probe): build it, trace a few tiles of the frame through it, go on for as long
+//! as nothing can be said, and finish the frame with the better tree. Starts come first (known-good
+//! parameters, what earlier runs left), then what a search proposes; what is best by the search's own account
+//! but not shown to be is tried once more, and what was measured of it is put together. A run stops trying
+//! when nothing is promised or nothing was found for long; from then on the incumbent is watched, and when its
+//! frames take longer or shorter than they did, one probe of the second best tells a change of the scene from
+//! a change of the machine: only in the one the ratio of the two changes, and the search begins again.
+//!
+//! Costs that the search sees are ratios of paired tiles, chained from incumbent to incumbent, times what the
+//! first frame cost: the drift of a machine is in none of them.
+//!
+//! Invariants: every frame adds one sample to every pixel, whatever was tried; the picture depends on seed
+//! and number of frames alone. A candidate that cannot be built or is hopeless costs its build and 1/32 of
+//! the tiles. Nothing here reads a clock but the stage's.
+
+mod frame;
+mod trial;
+
+use std::{collections::HashMap, time::Duration};
+
+use raywright_bvh::{BuildParams, Bvh};
+use raywright_imaging::{Camera, CancelToken, Film};
+use raywright_tracer::World;
+use raywright_tuner::{ChangeDetector, Config, Outcome, Search, Trial, Tuner};
+
+use super::{
+    comparison::Comparison,
+    probe::{Decision, ProbeRatio},
+    session::TrialFailure,
+    space::ParameterSpace,
+    stage::{Clock, SessionError, Settings, Stage, add_frame},
+};
+use frame::Frame;
+
+/// Gain that is not worth a trial, as a share of the cost; and proposals in a row that promise less.
+const LEAST_GAIN: f64 = 0.005;
+const QUIET_PROPOSALS: u32 = 5;
+
+/// Candidates in a row without a new incumbent after which nothing more is tried.
+const PATIENCE: u32 = 10;
+
+/// Probes of a candidate that could not be told from the incumbent.
+const MOST_PROBES: u32 = 5;
+
+/// Weight of the last frame in what a tile is expected to take.
+const FRESH: f64 = 0.2;
+
+/// A change of the ratio of two trees below this is none, as a logarithm.
+const SAME: f64 = 0.05;
+
+/// Standard deviation of the logarithm of the time of a frame that is taken for noise at least.
+const LEAST_NOISE: f64 = 0.01;
+
+/// Outcomes that are told again when the search begins again: the best.
+const KEPT: usize = 3;
+
+/// What one frame was.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct HybridFrame {
+    /// What was tried; `None`: the incumbent alone.
+    pub candidate: Option<Candidate>,
+    /// Time of the frame, builds and all.
+    pub time: Duration,
+    /// Its part in which trees were built.
+    pub build: Duration,
+    /// The parameters of the incumbent after the frame.
+    pub incumbent: BuildParams,
+    /// What a frame with the incumbent costs by the metric, in seconds, at the speed of these days.
+    pub incumbent_cost: f64,
+}
+
+/// A candidate, and what became of it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Candidate {
+    /// Its parameters.
+    pub params: BuildParams,
+    /// Why it was tried.
+    pub reason: String,
+    /// What was measured, or why nothing was.
+    pub outcome: Result<Probed, TrialFailure>,
+}
+
+/// What was measured of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Probed {
+    /// Time to build its tree; 0 if it was the incumbent's.
+    pub build: Duration,
+    /// Time to render over that of the incumbent, in this frame.
+    pub ratio: ProbeRatio,
+    /// The cost by the metric over that of the incumbent, all probes of it together, and its bounds.
+    pub cost_ratio: [f64; 3],
+    /// The cost by the metric that the search was told, in seconds.
+    pub cost: f64,
+    /// The share of the tiles that were traced through the candidate.
+    pub share: f64,
+    /// What was decided.
+    pub decision: Decision,
+}
+
+/// The tree that frames are rendered with.
+#[derive(Debug)]
+struct Incumbent {
+    config: Config,
+    params: BuildParams,
+    tree: Bvh,
+    /// Seconds of each of its builds.
+    builds: Vec<f64>,
+    /// The logarithm of its cost over that of the first incumbent.
+    log_cost: f64,
+}
+
+impl Incumbent {
+    fn build(&self) -> f64 {
+        self.builds.iter().sum::<f64>() / self.builds.len() as f64
+    }
+}
+
+/// A tuning run whose candidates are tried on tiles.
+#[derive(Debug)]
+pub struct Hybrid<'a, C> {
+    stage: Stage<'a, C>,
+    space: ParameterSpace,
+    search: fn() -> Box<dyn Search>,
+    tuner: Tuner,
+    first: BuildParams,
+    starts: Vec<BuildParams>,
+    /// What earlier runs left, until the first frame tells how fast the machine is.
+    known: Vec<(Config, Outcome)>,
+    film: Film,
+    finished: u32,
+    incumbent: Option<Incumbent>,
+    /// Seconds that each tile is expected to take with the incumbent.
+    tiles: Vec<f64>,
+    /// Seconds that the first frame cost.
+    unit: f64,
+    /// What is known of candidates beside this incumbent, and by how many probes.
+    probed: HashMap<Config, (ProbeRatio, u32)>,
+    quiet: u32,
+    fruitless: u32,
+    is_searching: bool,
+    detector: ChangeDetector,
+    /// What is to be tried to see whether something has changed, and the logarithm of what its cost was over
+    /// that of the incumbent.
+    check: Option<(Config, f64)>,
+    begun: u64,
+}
+
+impl<'a, C: Clock> Hybrid<'a, C> {
+    /// A run that has not begun; its first frame is rendered with `first`, and `search` proposes what is
+    /// tried after the starts.
+    ///
+    /// # Errors
+    /// If camera, picture size or instruction set cannot be used.
+    pub fn new(
+        world: &'a World,
+        camera: Camera,
+        settings: Settings,
+        space: ParameterSpace,
+        first: &BuildParams,
+        search: fn() -> Box<dyn Search>,
+        clock: C,
+    ) -> Result<Self, SessionError> {
+        let stage = Stage::checked(world, camera, settings, clock)?;
+        let film = stage.film()?;
+        let tuner = Tuner::new(space.space().clone(), search(), settings.seed);
+        Ok(Self {
+            tiles: Vec::new(),
+            stage,
+            space,
+            search,
+            tuner,
+            first: *first,
+            starts: Vec::new(),
+            known: Vec::new(),
+            film,
+            finished: 0,
+            incumbent: None,
+            unit: 0.0,
+            probed: HashMap::new(),
+            quiet: 0,
+            fruitless: 0,
+            is_searching: true,
+            detector: ChangeDetector::new(LEAST_NOISE),
+            check: None,
+            begun: 0,
+        })
+    }
+
+    /// The same run with parameters that are tried before the search proposes any, in this order.
+    #[must_use]
+    pub fn with_starts(mut self, starts: &[BuildParams]) -> Self {
+        self.starts = starts.to_vec();
+        self
+    }
+
+    /// The same run, in which some outcomes are known, with costs in seconds by the metric. If those of the
+    /// first parameters are among them, all are scaled by what the first frame costs now.
+    #[must_use]
+    pub fn with_known(mut self, known: impl IntoIterator<Item = (Config, Outcome)>) -> Self {
+        self.known.extend(known);
+        self
+    }
+
+    /// Renders the next frame; `None` if `cancel` was set before it was done.
+    ///
+    /// # Errors
+    /// If the first parameters cannot be built, or the tuner refuses a measurement.
+    pub fn frame(&mut self, cancel: &CancelToken) -> Result<Option<HybridFrame>, SessionError> {
+        self.frame_told(cancel, |_| ())
+    }
+
+    /// The same; `begins` hears of a trial before it is built.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame).
+    pub fn frame_told(
+        &mut self,
+        cancel: &CancelToken,
+        begins: impl FnOnce(&Trial),
+    ) -> Result<Option<HybridFrame>, SessionError> {
+        let start = self.stage.now();
+        let mut frame = Frame::new(
+            self.stage.film()?,
+            self.stage.tiles(),
+            self.finished,
+            cancel,
+        );
+        let Some(mut incumbent) = self.incumbent.take() else {
+            return self.first_frame(frame, start, begins);
+        };
+        let built = self.rebuild(&mut incumbent);
+        let trial = built.and_then(|build| Ok((build, self.next_trial(&incumbent)?)));
+        let tried = trial.and_then(|(build, trial)| match trial {
+            Some(trial) => {
+                begins(&trial);
+                let tried = self.try_candidate(&mut frame, &mut incumbent, &trial)?;
+                Ok(tried.map(|(candidate, own)| (Some(candidate), build + own)))
+            }
+            None => {
+                self.trace_rest(&mut frame, &incumbent.tree)?;
+                Ok(frame.is_done().then_some((None, build)))
+            }
+        });
+        let params = incumbent.params;
+        self.incumbent = Some(incumbent);
+        let Some((candidate, build)) = tried? else {
+            return Ok(None);
+        };
+        self.watch(&frame.times);
+        add_frame(&mut self.film, &frame.film);
+        self.finished += 1;
+        Ok(Some(HybridFrame {
+            candidate,
+            time: self.stage.now() - start,
+            build,
+            incumbent: params,
+            incumbent_cost: self.incumbent_cost().unwrap_or(0.0),
+        }))
+    }
+
+    /// All tiles with the first parameters.
+    fn first_frame(
+        &mut self,
+        mut frame: Frame<'_>,
+        start: Duration,
+        begins: impl FnOnce(&Trial),
+    ) -> Result<Option<HybridFrame>, SessionError> {
+        let config = self.config(&self.first)?;
+        let starts = self.starts.iter().map(|params| self.config(params));
+        let starts: Vec<Config> = starts.collect::<Result<_, _>>()?;
+        let trial = self.tuner.ask_for(&config);
+        begins(&trial);
+        let (tree, build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
+        self.trace_rest(&mut frame, &tree)?;
+        if !frame.is_done() {
+            self.stage.recycle(tree);
+            self.tell(&trial, Outcome::Cancelled)?;
+            return Ok(None);
+        }
+        self.tiles = vec![0.0; self.stage.tiles()];
+        for &(tile, time) in &frame.times {
+            self.tiles[tile] = time;
+        }
+        let incumbent = Incumbent {
+            config: trial.canonical.clone(),
+            params: self.first,
+            tree,
+            builds: vec![build.as_secs_f64()],
+            log_cost: 0.0,
+        };
+        self.incumbent = Some(incumbent);
+        self.unit = self.incumbent_cost().unwrap_or(0.0);
+        self.tell(&trial, Outcome::Done { cost: self.unit })?;
+        self.tell_known(&trial.canonical)?;
+        self.begin_starts(&starts);
+        add_frame(&mut self.film, &frame.film);
+        self.finished += 1;
+        Ok(Some(HybridFrame {
+            candidate: None,
+            time: self.stage.now() - start,
+            build,
+            incumbent: self.first,
+            incumbent_cost: self.unit,
+        }))
+    }
+
+    /// The configuration of some parameters.
+    fn config(&self, params: &BuildParams) -> Result<Config, SessionError> {
+        self.space.config(params).map_err(SessionError::Space)
+    }
+
+    /// Tells the tuner what earlier runs left, at the speed that the machine has now.
+    fn tell_known(&mut self, first: &Config) -> Result<(), SessionError> {
+        let known = std::mem::take(&mut self.known);
+        let same: Vec<f64> = known
+            .iter()
+            .filter(|(config, _)| self.space.space().canonical(config) == *first)
+            .filter_map(|(_, outcome)| match outcome {
+                Outcome::Done { cost } => Some(*cost),
+                _ => None,
+            })
+            .collect();
+        let mean = same.iter().sum::<f64>() / same.len() as f64;
+        let scale = if mean > 0.0 { self.unit / mean } else { 1.0 };
+        for (config, outcome) in known {
+            let outcome = match outcome {
+                Outcome::Done { cost } => Outcome::Done { cost: cost * scale },
+                other => other,
+            };
+            self.tuner
+                .tell_known(&config, outcome)
+                .map_err(SessionError::Tell)?;
+        }
+        Ok(())
+    }
+
+    /// Gives the tuner those starts that are not known.
+    fn begin_starts(&mut self, starts: &[Config]) {
+        let records = self.tuner.records().iter();
+        let mut known: Vec<Config> = records.map(|record| record.canonical.clone()).collect();
+        for config in starts {
+            let canonical = self.space.space().canonical(config);
+            if !known.contains(&canonical) {
+                known.push(canonical);
+                self.tuner.add_start(config.clone());
+            }
+        }
+    }
+
+    /// Builds the tree of the incumbent anew if its time has come.
+    fn rebuild(&mut self, incumbent: &mut Incumbent) -> Result<Duration, SessionError> {
+        let per_tree = self.stage.settings.metric.frames_per_tree();
+        let is_due = per_tree.is_some_and(|frames| self.finished.is_multiple_of(frames.get()));
+        if !is_due {
+            return Ok(Duration::ZERO);
+        }
+        let built = self.stage.build(&incumbent.params);
+        let (tree, time) = built.map_err(SessionError::Build)?;
+        let old = std::mem::replace(&mut incumbent.tree, tree);
+        self.stage.recycle(old);
+        incumbent.builds.push(time.as_secs_f64());
+        Ok(time)
+    }
+
+    /// What is tried in the next frame.
+    fn next_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
+        if let Some((config, _)) = &self.check {
+            return Ok(Some(self.tuner.ask_for(config)));
+        }
+        if let Some(config) = self.rival(incumbent) {
+            return Ok(Some(self.tuner.ask_for(&config)));
+        }
+        if !self.is_searching {
+            return Ok(None);
+        }
+        let trial = self.tuner.ask();
+        match self.tuner.expected_gain() {
+            Some(gain) if gain < LEAST_GAIN => self.quiet += 1,
+            Some(_) => self.quiet = 0,
+            None => {}
+        }
+        let has_starts = self.tuner.has_starts();
+        let is_hopeless = self.quiet >= QUIET_PROPOSALS || self.fruitless >= PATIENCE;
+        if is_hopeless && !has_starts {
+            self.is_searching = false;
+            self.tell(&trial, Outcome::Cancelled)?;
+            return Ok(None);
+        }
+        Ok(Some(trial))
+    }
+
+    /// What is the best by the account of the search, and neither the incumbent nor known to be no better.
+    fn rival(&self, incumbent: &Incumbent) -> Option<Config> {
+        let best = self.tuner.incumbent()?;
+        let probes = self.probed.get(&best.canonical).map_or(0, |known| known.1);
+        let is_rival = best.canonical != incumbent.config && probes < MOST_PROBES;
+        (is_rival && best.cost < self.unit * incumbent.log_cost.exp()).then(|| best.config.clone())
+    }
+
+    /// Tells the tuner an outcome.
+    fn tell(&mut self, trial: &Trial, outcome: Outcome) -> Result<(), SessionError> {
+        let told = self.tuner.tell(trial.id, outcome);
+        told.map(|_| ()).map_err(SessionError::Tell)
+    }
+
+    /// Looks whether frames take what they took: `times` of tiles with the incumbent.
+    fn watch(&mut self, times: &[(usize, f64)]) {
+        let (mut took, mut expected) = (0.0, 0.0);
+        for &(tile, time) in times {
+            took += time;
+            expected += self.tiles[tile];
+            self.tiles[tile] += FRESH * (time - self.tiles[tile]);
+        }
+        if self.detector.add((took / expected).ln()) && !self.is_searching {
+            self.check = self.yardstick();
+        }
+    }
+
+    /// The best of what is not the incumbent.
+    fn yardstick(&self) -> Option<(Config, f64)> {
+        let incumbent = self.incumbent.as_ref()?;
+        let records = self.tuner.records().iter();
+        let others = records
+            .filter(|record| record.canonical != incumbent.config && record.cost.is_finite());
+        let best = others.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        let log = (best.cost / self.unit).ln() - incumbent.log_cost;
+        Some((best.config.clone(), log))
+    }
+
+    /// After a probe of what is known: the search begins again if its cost over that of the incumbent is not
+    /// what it was.
+    fn checked(&mut self, incumbent: &Incumbent, probed: &Probed, known: f64) {
+        let now = (probed.cost / self.unit).ln() - incumbent.log_cost;
+        if (now - known).abs() > SAME.max(2.0 * probed.ratio.deviation) {
+            self.begin_again(incumbent);
+        }
+    }
+
+    /// Searches once more, beginning with what was best.
+    fn begin_again(&mut self, incumbent: &Incumbent) {
+        let mut records: Vec<_> = self.tuner.records().to_vec();
+        records.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let best = records.into_iter().filter(|record| !record.has_failed());
+        let mut starts: Vec<Config> = best.take(KEPT).map(|record| record.config).collect();
+        let portfolio = self.starts.iter();
+        starts.extend(portfolio.filter_map(|params| self.space.config(params).ok()));
+        self.begun += 1;
+        let seed = self.stage.settings.seed.wrapping_add(self.begun);
+        self.tuner = Tuner::new(self.space.space().clone(), (self.search)(), seed);
+        let cost = self.unit * incumbent.log_cost.exp();
+        let config = self.space.config(&incumbent.params);
+        if let Ok(config) = config {
+            // A cost that was told before can be told again.
+            let _ = self.tuner.tell_known(&config, Outcome::Done { cost });
+        }
+        self.begin_starts(&starts);
+        self.probed.clear();
+        (self.quiet, self.fruitless) = (0, 0);
+        self.is_searching = true;
+    }
+
+    /// Renders another scene, or from another camera, from the next frame on; both to be those that
+    /// differ from before in what concerns trees. The incumbent's parameters stay, its tree is built anew, and
+    /// the search begins again.
+    ///
+    /// # Errors
+    /// If the camera cannot be used, or the incumbent's parameters do not suit the scene.
+    pub fn change_scene(&mut self, world: &'a World, camera: Camera) -> Result<(), SessionError> {
+        camera.validate().map_err(SessionError::Camera)?;
+        self.stage.show(world, camera);
+        if let Some(mut incumbent) = self.incumbent.take() {
+            let built = self.stage.build(&incumbent.params);
+            let (tree, time) = built.map_err(SessionError::Build)?;
+            self.stage
+                .recycle(std::mem::replace(&mut incumbent.tree, tree));
+            incumbent.builds = vec![time.as_secs_f64()];
+            self.begin_again(&incumbent);
+            self.detector = ChangeDetector::new(LEAST_NOISE);
+            self.incumbent = Some(incumbent);
+        }
+        Ok(())
+    }
+
+    /// Renders from another place of the same scene from the next frame on. The picture begins anew. Whether
+    /// the place asks for another tree is noticed by the times of frames.
+    ///
+    /// # Errors
+    /// If the camera cannot be used.
+    pub fn move_camera(&mut self, camera: Camera) -> Result<(), SessionError> {
+        camera.validate().map_err(SessionError::Camera)?;
+        self.stage.camera = camera;
+        self.film = self.stage.film()?;
+        Ok(())
+    }
+
+    /// Measures `tuned` beside both baselines; as [`Session::compare`](super::Session::compare).
+    ///
+    /// # Errors
+    /// If a baseline cannot be built or the camera cannot be used.
+    pub fn compare(
+        &mut self,
+        tuned: &BuildParams,
+        rounds: usize,
+        cancel: &CancelToken,
+        progress: impl Fn(usize, usize),
+    ) -> Result<Comparison, SessionError> {
+        self.stage.compare(tuned, rounds, cancel, progress)
+    }
+
+    /// The parameters that frames are rendered with; `None` before the first frame.
+    #[must_use]
+    pub fn incumbent(&self) -> Option<BuildParams> {
+        self.incumbent.as_ref().map(|incumbent| incumbent.params)
+    }
+
+    /// What a frame with the incumbent costs by the metric, in seconds, as its tiles took lately.
+    #[must_use]
+    pub fn incumbent_cost(&self) -> Option<f64> {
+        let incumbent = self.incumbent.as_ref()?;
+        let render = self.tiles.iter().sum();
+        Some(self.stage.settings.metric.cost(incumbent.build(), render))
+    }
+
+    /// Whether something is still tried.
+    #[must_use]
+    pub fn is_searching(&self) -> bool {
+        self.is_searching
+    }
+
+    /// The space that is searched.
+    #[must_use]
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
+    /// The picture so far: one sample per pixel for every finished frame.
+    #[must_use]
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+}

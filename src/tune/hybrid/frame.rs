@@ -1,0 +1,70 @@
+//! A frame on its way: which of its tiles are done.
+//!
+//! Invariant: no tile is rendered twice.
+
+use std::time::Duration;
+
+use raywright_bvh::Bvh;
+use raywright_imaging::{CancelToken, Film};
+
+use super::Hybrid;
+use crate::tune::stage::{Clock, SessionError};
+
+/// A frame that is being rendered.
+pub(super) struct Frame<'c> {
+    /// One sample of each pixel of the tiles that are done.
+    pub(super) film: Film,
+    /// The number of its sample.
+    pub(super) sample: u32,
+    /// Seconds of the tiles that were traced through the tree that is the incumbent in the end.
+    pub(super) times: Vec<(usize, f64)>,
+    done: Vec<bool>,
+    cancel: &'c CancelToken,
+}
+
+impl<'c> Frame<'c> {
+    /// A frame of which nothing is rendered.
+    pub(super) fn new(film: Film, tiles: usize, sample: u32, cancel: &'c CancelToken) -> Self {
+        Self {
+            film,
+            sample,
+            times: Vec::with_capacity(tiles),
+            done: vec![false; tiles],
+            cancel,
+        }
+    }
+
+    /// Whether all tiles are done.
+    pub(super) fn is_done(&self) -> bool {
+        self.done.iter().all(|done| *done)
+    }
+}
+
+impl<C: Clock> Hybrid<'_, C> {
+    /// Traces those tiles that are not done and for which there is a tree; what each took, in seconds. No
+    /// tile is begun after `limit`.
+    pub(super) fn trace<'t>(
+        &self,
+        frame: &mut Frame<'_>,
+        limit: Duration,
+        tree_of: impl Fn(usize) -> Option<&'t Bvh> + Sync,
+    ) -> Result<Vec<(usize, f64)>, SessionError> {
+        let done = &frame.done;
+        let left = |tile: usize| if done[tile] { None } else { tree_of(tile) };
+        let (film, cancel) = (&mut frame.film, frame.cancel);
+        let times = self
+            .stage
+            .render_tiles(film, frame.sample, limit, cancel, left)?;
+        for &(tile, _) in &times {
+            frame.done[tile] = true;
+        }
+        Ok(times)
+    }
+
+    /// Traces all tiles that are not done.
+    pub(super) fn trace_rest(&self, frame: &mut Frame<'_>, tree: &Bvh) -> Result<(), SessionError> {
+        let times = self.trace(frame, Duration::MAX, |_| Some(tree))?;
+        frame.times.extend(times);
+        Ok(())
+    }
+}

@@ -1,0 +1,259 @@
+//! A candidate in a frame: built, traced on more and more tiles, accepted or not.
+//!
+//! Invariant: whatever becomes of the candidate, the trial is told once, and the frame is finished unless it
+//! was cancelled.
+
+use std::time::Duration;
+
+use raywright_bvh::{BuildParams, Bvh};
+use raywright_tuner::{ChangeDetector, Outcome, Trial};
+
+use super::{Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, frame::Frame};
+use crate::tune::{
+    probe::{Costs, Decision, Pair, ProbeRatio, SHARES, spread_order},
+    session::TrialFailure,
+    stage::{Clock, SessionError},
+};
+
+/// A part of a probe is given up after so many times what the whole frame takes with the incumbent.
+const SLOWEST_PART: f64 = 2.0;
+
+/// What a probe has found.
+struct Probe {
+    /// In this frame.
+    ratio: ProbeRatio,
+    /// In all frames.
+    all: ProbeRatio,
+    decision: Decision,
+    candidate_times: Vec<(usize, f64)>,
+    incumbent_times: Vec<(usize, f64)>,
+}
+
+impl<C: Clock> Hybrid<'_, C> {
+    /// Tries what a trial says, and finishes the frame with the better tree; the candidate and the time of its
+    /// build. `None` if the frame was cancelled.
+    pub(super) fn try_candidate(
+        &mut self,
+        frame: &mut Frame<'_>,
+        incumbent: &mut Incumbent,
+        trial: &Trial,
+    ) -> Result<Option<(Candidate, Duration)>, SessionError> {
+        let params = self.space.params(&trial.config);
+        // The incumbent beside itself shows how much noise there is, and needs no tree.
+        let is_own = trial.canonical == incumbent.config;
+        let built = if is_own {
+            Ok(None)
+        } else {
+            self.stage.build(&params).map(Some)
+        };
+        let (outcome, build) = match built {
+            Err(error) => {
+                self.trace_rest(frame, &incumbent.tree)?;
+                (Err(TrialFailure::Build(error)), Duration::ZERO)
+            }
+            Ok(None) => {
+                let build = incumbent.build();
+                let costs = self.costs(incumbent, build);
+                let probe = self.probe(frame, [&incumbent.tree; 2], &costs, None)?;
+                self.trace_rest(frame, &incumbent.tree)?;
+                (self.own(frame, incumbent, probe, &costs), Duration::ZERO)
+            }
+            Ok(Some((tree, build))) => {
+                let outcome = self.beside(frame, incumbent, trial, params, tree, build)?;
+                (outcome, build)
+            }
+        };
+        let told = match &outcome {
+            _ if !frame.is_done() => Outcome::Cancelled,
+            Ok(probed) => Outcome::Done { cost: probed.cost },
+            Err(failure) => Outcome::Failed {
+                reason: failure.to_string(),
+            },
+        };
+        self.tell(trial, told)?;
+        if !frame.is_done() {
+            return Ok(None);
+        }
+        match &outcome {
+            Ok(probed) if probed.decision == Decision::Accepted => self.fruitless = 0,
+            _ if is_own => {}
+            _ => self.fruitless += 1,
+        }
+        if let Some((_, known)) = self.check.take()
+            && let Ok(probed) = &outcome
+        {
+            self.checked(incumbent, probed, known);
+        }
+        let candidate = Candidate {
+            params,
+            reason: trial.reason.to_string(),
+            outcome,
+        };
+        Ok(Some((candidate, build)))
+    }
+
+    /// What frames cost with the incumbent, and with a tree that takes `build` seconds.
+    fn costs(&self, incumbent: &Incumbent, build: f64) -> Costs {
+        let share = self.stage.settings.metric.build_share();
+        Costs {
+            render: self.tiles.iter().sum(),
+            incumbent_build: share * incumbent.build(),
+            candidate_build: share * build,
+        }
+    }
+
+    /// The incumbent beside itself.
+    fn own(
+        &self,
+        frame: &mut Frame<'_>,
+        incumbent: &Incumbent,
+        probe: Option<Probe>,
+        costs: &Costs,
+    ) -> Result<Probed, TrialFailure> {
+        let probe = probe.ok_or(TrialFailure::TooSlow)?;
+        frame.times.extend(&probe.candidate_times);
+        frame.times.extend(&probe.incumbent_times);
+        let cost = self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp());
+        Ok(Probed {
+            build: Duration::ZERO,
+            ratio: probe.ratio,
+            cost_ratio: costs.bounds(probe.ratio),
+            cost,
+            share: 0.0,
+            decision: Decision::Undecided,
+        })
+    }
+
+    /// Another tree beside the incumbent's, in whose place it comes if it is better.
+    fn beside(
+        &mut self,
+        frame: &mut Frame<'_>,
+        incumbent: &mut Incumbent,
+        trial: &Trial,
+        params: BuildParams,
+        tree: Bvh,
+        build: Duration,
+    ) -> Result<Result<Probed, TrialFailure>, SessionError> {
+        let costs = self.costs(incumbent, build.as_secs_f64());
+        // What is to be seen by a check is whether what was known still holds.
+        let is_check = self.check.is_some();
+        let before = self.probed.get(&trial.canonical).copied();
+        let before = before.filter(|_| !is_check);
+        let trees = [&tree, &incumbent.tree];
+        let probe = self.probe(frame, trees, &costs, before.map(|known| known.0))?;
+        let is_accepted =
+            !is_check && (probe.as_ref()).is_some_and(|probe| probe.decision == Decision::Accepted);
+        self.trace_rest(frame, if is_accepted { &tree } else { &incumbent.tree })?;
+        let Some(probe) = probe else {
+            self.stage.recycle(tree);
+            return Ok(Err(TrialFailure::TooSlow));
+        };
+        let share = probe.candidate_times.len() as f64 / self.tiles.len() as f64;
+        let other_share = probe.incumbent_times.len() as f64 / self.tiles.len() as f64;
+        let probed = Probed {
+            build,
+            ratio: probe.ratio,
+            cost_ratio: costs.bounds(probe.all),
+            cost: self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp()),
+            share: if is_accepted {
+                1.0 - other_share
+            } else {
+                share
+            },
+            decision: probe.decision,
+        };
+        if !frame.is_done() {
+            self.stage.recycle(tree);
+            return Ok(Ok(probed));
+        }
+        if is_accepted {
+            frame.times.extend(&probe.candidate_times);
+            let factor = probe.all.log.exp();
+            self.tiles.iter_mut().for_each(|time| *time *= factor);
+            let old = std::mem::replace(&mut incumbent.tree, tree);
+            self.stage.recycle(old);
+            incumbent.config = trial.canonical.clone();
+            incumbent.params = params;
+            incumbent.builds = vec![build.as_secs_f64()];
+            incumbent.log_cost += costs.ratio(factor).ln();
+            self.probed.clear();
+            self.quiet = 0;
+            self.detector = ChangeDetector::new(LEAST_NOISE);
+        } else {
+            frame.times.extend(&probe.incumbent_times);
+            self.stage.recycle(tree);
+            let probes = match probe.decision {
+                Decision::Rejected => MOST_PROBES,
+                _ => before.map_or(0, |known| known.1) + 1,
+            };
+            let known = (probe.all, probes);
+            self.probed.insert(trial.canonical.clone(), known);
+        }
+        Ok(Ok(probed))
+    }
+
+    /// Traces tiles through the trees of candidate and incumbent until one is seen to be better, or half of
+    /// the frame is done with either. `None` if nothing could be measured.
+    fn probe(
+        &self,
+        frame: &mut Frame<'_>,
+        [candidate, incumbent]: [&Bvh; 2],
+        costs: &Costs,
+        before: Option<ProbeRatio>,
+    ) -> Result<Option<Probe>, SessionError> {
+        let order = spread_order(self.tiles.len(), frame.sample);
+        let limit = Duration::try_from_secs_f64(SLOWEST_PART * costs.render);
+        let limit = limit.unwrap_or(Duration::MAX);
+        let mut pairs: Vec<Pair> = Vec::new();
+        let (mut candidate_times, mut incumbent_times) = (Vec::new(), Vec::new());
+        let mut found = None;
+        let mut begin = 0;
+        for share in SHARES {
+            let end = 2 * ((share * order.len() as f64) as usize).min(order.len() / 2);
+            let part = &order[begin.min(end)..end];
+            begin = end;
+            // Even ones are the candidate's.
+            let mut trees: Vec<Option<&Bvh>> = vec![None; order.len()];
+            for pair in part.chunks_exact(2) {
+                trees[pair[0]] = Some(candidate);
+                trees[pair[1]] = Some(incumbent);
+            }
+            let times = self.trace(frame, limit, |tile| trees[tile])?;
+            let mut took: Vec<Option<f64>> = vec![None; order.len()];
+            for &(tile, time) in &times {
+                took[tile] = Some(time);
+            }
+            for pair in part.chunks_exact(2) {
+                let [own, other] = [pair[0], pair[1]];
+                candidate_times.extend(took[own].map(|time| (own, time)));
+                incumbent_times.extend(took[other].map(|time| (other, time)));
+                if let [Some(time), Some(other_time)] = [took[own], took[other]] {
+                    pairs.push(Pair {
+                        candidate: [time, self.tiles[own]],
+                        incumbent: [other_time, self.tiles[other]],
+                    });
+                }
+            }
+            let Some(ratio) = ProbeRatio::of(&pairs) else {
+                continue;
+            };
+            let all = before.map_or(ratio, |before| before.and(ratio));
+            let decision = costs.decide(all);
+            found = Some((ratio, all, decision));
+            if decision != Decision::Undecided || times.len() < part.len() {
+                break;
+            }
+        }
+        // What was traced in vain is the incumbent's all the same.
+        if found.is_none() {
+            frame.times.extend(&incumbent_times);
+        }
+        Ok(found.map(|(ratio, all, decision)| Probe {
+            ratio,
+            all,
+            decision,
+            candidate_times,
+            incumbent_times,
+        }))
+    }
+}
