@@ -28,7 +28,7 @@ use raywright_tuner::{ChangeDetector, Config, Outcome, Search, Trial, Tuner};
 
 use super::{
     comparison::Comparison,
-    probe::{Decision, ProbeRatio},
+    probe::{Decision, INTERRUPTED, ProbeRatio},
     session::TrialFailure,
     space::ParameterSpace,
     stage::{Clock, SessionError, Settings, Stage, add_frame},
@@ -415,7 +415,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         for &(tile, time) in times {
             took += time;
             expected += self.tiles[tile];
-            self.tiles[tile] += FRESH * (time - self.tiles[tile]);
+            let most = INTERRUPTED * self.tiles[tile];
+            self.tiles[tile] += FRESH * (time.min(most) - self.tiles[tile]);
         }
         if self.detector.add((took / expected).ln()) && !self.is_searching {
             self.check = self.yardstick();
@@ -545,3 +546,6 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         &self.film
     }
 }
+
+#[cfg(test)]
+mod tests;

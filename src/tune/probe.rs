@@ -9,6 +9,9 @@
 //! Ratio estimation and the jackknife over pairs: Cochran, *Sampling Techniques*, 1977, section 6. A probe
 //! goes on with twice as many tiles for as long as it has not decided, up to half of the frame.
 //!
+//! A tile that takes much longer than its like was interrupted by something else on the machine, and is taken
+//! for one that was not.
+//!
 //! Invariants: a ratio of times that are all multiplied by a number is the same; bounds lie on both sides of
 //! the ratio; no pairs decide nothing.
 
@@ -22,6 +25,9 @@ const ONE_SIDED: f64 = 1.645;
 const WORSE: f64 = 1.02;
 /// …or, before more than the first part is rendered, when it is expected to be above this.
 const MUCH_WORSE: f64 = 1.25;
+
+/// Times what is usual of a tile from which it was interrupted.
+pub(super) const INTERRUPTED: f64 = 3.0;
 
 /// Pairs below which bounds are not believed.
 const FEW_PAIRS: usize = 5;
@@ -54,6 +60,7 @@ impl ProbeRatio {
     /// From pairs; `None` if there are none, or times that are no times.
     #[must_use]
     pub fn of(pairs: &[Pair]) -> Option<Self> {
+        let pairs = &without_interruptions(pairs);
         let sum = |pairs: &mut dyn Iterator<Item = &Pair>| {
             pairs.fold([0.0; 4], |mut sum, pair| {
                 let [a, b] = pair.candidate;
@@ -114,6 +121,39 @@ impl ProbeRatio {
         let reach = ONE_SIDED * self.deviation;
         [self.log, self.log - reach, self.log + reach].map(f64::exp)
     }
+}
+
+/// Pairs in which no tile took more than [`INTERRUPTED`] times what is usual on its side.
+fn without_interruptions(pairs: &[Pair]) -> Vec<Pair> {
+    let most = |side: fn(&Pair) -> [f64; 2]| {
+        let mut factors: Vec<f64> = pairs
+            .iter()
+            .map(|pair| side(pair)[0] / side(pair)[1])
+            .collect();
+        factors.sort_by(f64::total_cmp);
+        let median = factors.get(factors.len() / 2);
+        INTERRUPTED * median.copied().unwrap_or(f64::INFINITY)
+    };
+    let [candidate, incumbent] = [most(|pair| pair.candidate), most(|pair| pair.incumbent)];
+    let least = |[time, expected]: [f64; 2], most: f64| {
+        // A NaN is kept.
+        let is_interrupted = time > most * expected;
+        [
+            if is_interrupted {
+                most * expected
+            } else {
+                time
+            },
+            expected,
+        ]
+    };
+    pairs
+        .iter()
+        .map(|pair| Pair {
+            candidate: least(pair.candidate, candidate),
+            incumbent: least(pair.incumbent, incumbent),
+        })
+        .collect()
 }
 
 /// Standard deviation of the time of one build, as a share: 6 to 8 % for single builds on a shared machine.
@@ -246,6 +286,16 @@ mod tests {
         let both = ratio.and(ratio);
         assert!((both.deviation - ratio.deviation / 2.0_f64.sqrt()).abs() < 1e-12);
         assert_eq!(both.log, ratio.log);
+    }
+
+    #[test]
+    fn interruptions_are_no_slowness() {
+        let mut odd = pairs(60, 0.9, 1.0, 0.05);
+        odd[7].candidate[0] += 500.0;
+        odd[31].incumbent[0] += 300.0;
+        let [middle, lower, upper] = ProbeRatio::of(&odd).unwrap().bounds();
+        assert!((0.85..0.95).contains(&middle), "{middle}");
+        assert!(lower < 0.9 && 0.9 < upper);
     }
 
     #[test]

@@ -1,0 +1,232 @@
+//! Frames of a hybrid run: their picture, their trials, their end.
+
+use std::{
+    sync::atomic::{AtomicU64, Ordering},
+    time::Duration,
+};
+
+use raywright_bvh::{BuildParams, Quality};
+use raywright_imaging::{CancelToken, Film, TileLoop};
+use raywright_tracer::{Integrator, Shot, generate};
+use raywright_tuner::GaussianProcess;
+
+use super::*;
+use crate::tune::{Metric, SpaceAxes, TrialFailure, WallClock, portfolio};
+
+/// Goes on by another step each time that it is looked at; with 0 it stands still.
+struct OddClock(AtomicU64, u64);
+
+impl Clock for OddClock {
+    fn now(&self) -> Duration {
+        let looks = self.0.fetch_add(1, Ordering::Relaxed);
+        let odd = looks.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 54;
+        Duration::from_nanos(looks * 1000 * self.1 + odd.min(self.1 * 500))
+    }
+}
+
+fn settings(metric: Metric) -> Settings {
+    Settings {
+        width: 250,
+        height: 170,
+        path_length: 2,
+        metric,
+        seed: 5,
+        isa: raywright_bvh::Isa::best(),
+    }
+}
+
+struct Place {
+    world: World,
+    camera: Camera,
+}
+
+fn place(name: &str) -> Place {
+    let scene = match name {
+        "interior" => generate::interior(1),
+        _ => generate::voxel_terrain(24),
+    };
+    let camera = scene.camera.expect("generated scenes have one");
+    Place {
+        world: World::new(scene),
+        camera,
+    }
+}
+
+fn hybrid<'p, C: Clock>(
+    place: &'p Place,
+    metric: Metric,
+    first: &BuildParams,
+    clock: C,
+) -> Hybrid<'p, C> {
+    let base = BuildParams::default();
+    let space = ParameterSpace::new(&base, &[], SpaceAxes::Canonical).unwrap();
+    let search = || -> Box<dyn Search> { Box::new(GaussianProcess::new()) };
+    let run = Hybrid::new(
+        &place.world,
+        place.camera,
+        settings(metric),
+        space,
+        first,
+        search,
+        clock,
+    );
+    run.unwrap().with_starts(&portfolio(&base))
+}
+
+/// The same frames by one tree.
+fn plain(place: &Place, frames: u32) -> Film {
+    let settings = settings(Metric::Render);
+    let shot = Shot {
+        world: &place.world,
+        camera: place.camera,
+        integrator: Integrator::Path {
+            path_length: settings.path_length,
+        },
+        seed: settings.seed,
+    };
+    let tree = place
+        .world
+        .build_tree(&BuildParams::default(), &mut Default::default())
+        .unwrap();
+    let mut film = Film::new(settings.width, settings.height).unwrap();
+    for sample in 0..frames {
+        let done = shot.render(&mut film, sample..sample + 1, &TileLoop::new(), |_| &tree);
+        assert_eq!(done, Ok(raywright_imaging::Completion::Finished));
+    }
+    film
+}
+
+#[test]
+fn whatever_is_tried_the_picture_is_that_of_one_tree() {
+    let place = place("interior");
+    let expected = plain(&place, 30).mean();
+    for metric in [
+        Metric::Render,
+        Metric::Total,
+        Metric::of_frames_per_tree(7.try_into().unwrap()),
+    ] {
+        for step in [0, 1, 3] {
+            let clock = OddClock(AtomicU64::new(1), step);
+            let mut run = hybrid(&place, metric, &BuildParams::default(), clock);
+            let mut tried = 0;
+            for _ in 0..30 {
+                let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+                tried += usize::from(frame.candidate.is_some());
+                assert_eq!(Some(frame.incumbent), run.incumbent());
+            }
+            assert!(tried >= 5, "{tried}");
+            assert!(run.film().mean() == expected, "{metric:?} {step}");
+        }
+    }
+}
+
+#[test]
+fn a_bad_tree_is_left_at_once_and_a_good_one_kept() {
+    let place = place("voxel-terrain");
+    let mut bad = BuildParams::default();
+    (bad.quality, bad.branching_factor) = (Quality::Morton, 2);
+    (bad.min_leaf_size, bad.max_leaf_size) = (32, 32);
+    let mut run = hybrid(&place, Metric::Render, &bad, WallClock::start());
+    for _ in 0..8 {
+        run.frame(&CancelToken::new()).unwrap().unwrap();
+    }
+    let incumbent = run.incumbent().unwrap();
+    assert_ne!(incumbent, bad);
+    assert!(
+        incumbent.branching_factor > 2 || incumbent.min_leaf_size < 32,
+        "{incumbent:?}"
+    );
+    // And nobody goes back to it.
+    let mut run =
+        hybrid(&place, Metric::Render, &incumbent, WallClock::start()).with_starts(&[bad]);
+    run.frame(&CancelToken::new()).unwrap();
+    let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+    let probed = frame.candidate.unwrap().outcome.unwrap();
+    assert_ne!(probed.decision, Decision::Accepted);
+    assert!(probed.share <= 0.5, "{probed:?}");
+    assert_eq!(run.incumbent(), Some(incumbent));
+}
+
+#[test]
+fn trying_comes_to_an_end_and_begins_again_with_another_scene() {
+    let [first, second] = ["interior", "voxel-terrain"].map(place);
+    let clock = OddClock(AtomicU64::new(1), 2);
+    let mut run = hybrid(&first, Metric::Render, &BuildParams::default(), clock);
+    let frames = (0..400).take_while(|_| {
+        run.frame(&CancelToken::new()).unwrap();
+        run.is_searching()
+    });
+    assert!(frames.count() < 399);
+    run.change_scene(&second.world, second.camera).unwrap();
+    assert!(run.is_searching());
+    let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+    assert!(frame.candidate.is_some());
+}
+
+#[test]
+fn what_cannot_be_built_costs_nothing_but_its_build() {
+    let place = place("voxel-terrain");
+    let mut flat = BuildParams::default();
+    (flat.max_depth, flat.branching_factor, flat.max_leaf_size) = (8, 2, 4);
+    flat.min_leaf_size = 1;
+    let run = hybrid(
+        &place,
+        Metric::Render,
+        &BuildParams::default(),
+        WallClock::start(),
+    );
+    let mut run = run.with_starts(&[flat]);
+    let mut failed = false;
+    for _ in 0..3 {
+        let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+        if let Some(Candidate {
+            outcome: Err(TrialFailure::Build(_)),
+            ..
+        }) = frame.candidate
+        {
+            failed = true;
+        }
+    }
+    assert!(failed);
+    assert!(run.film().mean() == plain(&place, 3).mean());
+}
+
+#[test]
+fn a_cancelled_frame_is_as_if_never_begun() {
+    let place = place("interior");
+    let clock = OddClock(AtomicU64::new(1), 1);
+    let mut run = hybrid(&place, Metric::Total, &BuildParams::default(), clock);
+    for frame in 0..6 {
+        let cancelled = CancelToken::new();
+        cancelled.cancel();
+        assert!(run.frame(&cancelled).unwrap().is_none());
+        assert_eq!(run.incumbent().is_some(), frame > 0);
+        assert!(run.frame(&CancelToken::new()).unwrap().is_some());
+    }
+    assert!(run.film().mean() == plain(&place, 6).mean());
+}
+
+#[test]
+fn what_is_known_is_scaled_to_the_machine_and_not_tried_before_it_is_better() {
+    let place = place("interior");
+    let base = BuildParams::default();
+    let mut other = base;
+    other.branching_factor = 4;
+    for (cost, is_tried) in [(50.0, true), (200.0, false)] {
+        let run = hybrid(
+            &place,
+            Metric::Render,
+            &base,
+            OddClock(AtomicU64::new(1), 1),
+        );
+        let configs = [base, other].map(|params| run.space().config(&params).unwrap());
+        let known = configs.into_iter().zip([100.0, cost]);
+        let mut run = run
+            .with_starts(&[])
+            .with_known(known.map(|(config, cost)| (config, Outcome::Done { cost })));
+        run.frame(&CancelToken::new()).unwrap();
+        let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+        let tried = frame.candidate.map(|candidate| candidate.params);
+        assert_eq!(tried == Some(other), is_tried, "{tried:?}");
+    }
+}
