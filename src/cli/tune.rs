@@ -284,6 +284,8 @@ fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {
             .named()
             .map(|(name, value)| (name.into(), value))
             .collect(),
+        policy: None,
+        frames_per_tree: None,
     }
 }
 
@@ -345,6 +347,9 @@ fn frame_record(
             (best, cost) => best.or(cost),
         },
         is_incumbent: report.is_incumbent,
+        frame_ms: None,
+        probe: None,
+        reason: None,
     }
 }
 

@@ -70,6 +70,9 @@ pub(crate) fn frame(index: usize) -> FrameRecord {
         failure: failed.then(|| format!("the tree is deeper than {max_depth} levels")),
         incumbent_cost_ms: None,
         is_incumbent: false,
+        frame_ms: None,
+        probe: None,
+        reason: None,
     }
 }
 
@@ -92,6 +95,8 @@ fn header(frames_planned: usize) -> RunHeader {
         instruction_set: "avx512".to_string(),
         frames_planned,
         indicators,
+        policy: None,
+        frames_per_tree: None,
     }
 }
 

@@ -5,6 +5,7 @@
 //! returns, so that an interrupted run keeps what is done. Invariant: every number in the file is
 //! the number that was measured. JSON knows neither NaN nor infinity, and a serialiser would write
 //! `null` for them, which here means *absent*: such a record is refused before anything is written.
+//! Only ratio and bounds of a probe may be without a value, and are then indeed absent.
 
 use std::error::Error;
 use std::fmt;
@@ -14,7 +15,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::record::{ComparisonRow, FrameRecord, RunHeader, RunSummary, Spread};
+use super::record::{ComparisonRow, FrameRecord, ProbeRecord, RunHeader, RunSummary, Spread};
 
 /// Writes the records of one run to a file.
 #[derive(Debug)]
@@ -130,10 +131,14 @@ fn numbers_of_header(header: &RunHeader) -> Vec<(String, f64)> {
         instruction_set: _,
         frames_planned: _,
         indicators,
+        policy: _,
+        frames_per_tree,
     } = header;
+    let frames_per_tree = frames_per_tree.map(|frames| ("frames_per_tree".to_string(), frames));
     indicators
         .iter()
         .map(|(name, value)| (format!("indicators[{name}]"), *value))
+        .chain(frames_per_tree)
         .collect()
 }
 
@@ -147,12 +152,28 @@ fn numbers_of_frame(frame: &FrameRecord) -> Vec<(String, f64)> {
         failure: _,
         incumbent_cost_ms,
         is_incumbent: _,
+        frame_ms,
+        probe,
+        reason: _,
     } = frame;
+    let share = probe.as_ref().map(|probe| {
+        let ProbeRecord {
+            share,
+            pairs: _,
+            ratio: _,
+            lower: _,
+            upper: _,
+            decision: _,
+        } = probe;
+        *share
+    });
     [
         ("build_ms", build_ms),
         ("render_ms", render_ms),
         ("cost_ms", cost_ms),
         ("incumbent_cost_ms", incumbent_cost_ms),
+        ("frame_ms", frame_ms),
+        ("probe.share", &share),
     ]
     .into_iter()
     .filter_map(|(name, value)| value.map(|value| (name.to_string(), value)))
@@ -296,6 +317,10 @@ mod tests {
         frame.render_ms = Some(f64::NAN);
         assert_refused(log.frame(&frame), "render_ms");
 
+        frame.render_ms = None;
+        frame.frame_ms = Some(f64::INFINITY);
+        assert_refused(log.frame(&frame), "frame_ms");
+
         let mut run = example::run(1);
         run.header.indicators[3].1 = f64::INFINITY;
         let field = format!("indicators[{}]", run.header.indicators[3].0);
@@ -316,6 +341,47 @@ mod tests {
             Err(LogError::NotFinite { field, .. }) => assert_eq!(field, expected),
             other => panic!("{expected} should have been refused, but: {other:?}"),
         }
+    }
+
+    /// Lines as version 0.1.0 wrote them, before there were probes.
+    #[test]
+    fn old_lines_are_read() {
+        let header = r#"{"record":"header","schema_version":1,"version":"0.1.0","scene":"rooms","triangles":12,"width":64,"height":36,"path_length":3,"metric":"total","search":"random","seed":1,"threads":2,"instruction_set":"avx2","frames_planned":1,"indicators":[["a",1.5]]}"#;
+        let OwnedLine::Header(header) = serde_json::from_str(header).unwrap() else {
+            panic!("this is a header");
+        };
+        assert_eq!((header.policy, header.frames_per_tree), (None, None));
+        assert_eq!(header.indicators, [("a".to_string(), 1.5)]);
+        let frame = r#"{"record":"frame","frame":3,"config":[["quality","morton"]],"build_ms":2.5,"render_ms":4.0,"cost_ms":6.5,"failure":null,"incumbent_cost_ms":6.5,"is_incumbent":true}"#;
+        let OwnedLine::Frame(frame) = serde_json::from_str(frame).unwrap() else {
+            panic!("this is a frame");
+        };
+        assert_eq!(frame.cost_ms, Some(6.5));
+        assert_eq!((frame.frame_ms, frame.probe, frame.reason), (None, None, None));
+    }
+
+    #[test]
+    fn a_probe_without_bounds_is_written_and_read() {
+        let scratch = Scratch::new("bounds");
+        let mut log = RunLog::create(&scratch.0).unwrap();
+        let mut frame = example::frame(0);
+        frame.probe = Some(ProbeRecord {
+            share: 0.25,
+            pairs: 2,
+            ratio: 1.5,
+            lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
+            decision: "undecided".to_string(),
+        });
+        log.frame(&frame).unwrap();
+        let OwnedLine::Frame(read) = serde_json::from_str(&scratch.text()).unwrap() else {
+            panic!("this is a frame");
+        };
+        let probe = read.probe.unwrap();
+        assert_eq!((probe.ratio, probe.upper), (1.5, f64::INFINITY));
+        assert!(probe.lower.is_nan());
+        frame.probe.as_mut().unwrap().share = f64::NAN;
+        assert_refused(log.frame(&frame), "probe.share");
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What a tuning run leaves behind, as plain data: the JSON lines and the HTML page are made from
 //! these values and from nothing else. Times are milliseconds of wall clock.
+//!
+//! Fields are added at the end and may be absent, so that logs of earlier versions are read.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +39,13 @@ pub struct RunHeader {
     pub frames_planned: usize,
     /// The 17 scene indicators: name and value.
     pub indicators: Vec<(String, f64)>,
+    /// Name of what decides whether a frame is a trial, a probe or neither; absent: every frame is
+    /// a trial.
+    #[serde(default)]
+    pub policy: Option<String>,
+    /// How many frames a tree serves in the metric: a frame bears its share of the build.
+    #[serde(default)]
+    pub frames_per_tree: Option<f64>,
 }
 
 /// One frame of the search.
@@ -58,6 +67,46 @@ pub struct FrameRecord {
     pub incumbent_cost_ms: Option<f64>,
     /// Whether this frame became the incumbent.
     pub is_incumbent: bool,
+    /// What the whole frame took, build and everything; absent in logs that had no probes, where it
+    /// is build and render.
+    #[serde(default)]
+    pub frame_ms: Option<f64>,
+    /// How the candidate did on some tiles of the frame, if it was probed.
+    #[serde(default)]
+    pub probe: Option<ProbeRecord>,
+    /// Why this configuration was asked for: `incumbent`, `start`, or the words of a search.
+    #[serde(default)]
+    pub reason: Option<String>,
+}
+
+/// A candidate beside the incumbent in one frame: some tiles were rendered with each.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProbeRecord {
+    /// Share of the tiles of the frame that were rendered with the candidate, 0 to 1.
+    pub share: f64,
+    /// Pairs of tiles that were compared.
+    pub pairs: usize,
+    /// Time to render a tile with the candidate ÷ the same with the incumbent: geometric mean over
+    /// the pairs; NaN if there are none, in a file `null`.
+    #[serde(deserialize_with = "or_nan")]
+    pub ratio: f64,
+    /// One-sided lower bound of the ratio at 95 %; NaN if too few pairs give none, in a file
+    /// `null`.
+    #[serde(deserialize_with = "or_nan")]
+    pub lower: f64,
+    /// The upper bound; infinite if too few pairs give none, in a file `null`.
+    #[serde(deserialize_with = "or_infinity")]
+    pub upper: f64,
+    /// `accepted`, `rejected`, `undecided`, `given up` or `failed`.
+    pub decision: String,
+}
+
+fn or_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+fn or_infinity<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
 /// Median and quartiles of repeated measurements.
