@@ -4,8 +4,11 @@
 //! Every frame is written to the log when it is done, so that an interrupted run keeps what it
 //! has. The report is made from the same records.
 
+mod frames;
+
 use std::{
     fs,
+    num::NonZeroU32,
     path::{Path, PathBuf},
 };
 
@@ -23,11 +26,13 @@ use raywright::{
     },
     tracer::{Indicators, Integrator},
     tune::{
-        self, Comparison, FrameReport, Memory, Metric, ParameterSpace, Session, Settings,
-        SpaceAxes, WallClock, milliseconds,
+        self, Comparison, Hybrid, Memory, Metric, ParameterSpace, Session, Settings, SpaceAxes,
+        WallClock, milliseconds,
     },
-    tuner::{SEARCH_NAMES, search_by_name},
+    tuner::{SEARCH_NAMES, Search, search_by_name},
 };
+
+use frames::Frames;
 
 use super::{
     Failure, memory, output,
@@ -41,6 +46,41 @@ enum MetricOption {
     Render,
     /// Time to build and render: the tree is built for each frame
     Total,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Policy {
+    /// Tries candidates on some tiles of a frame and keeps the best tree for the rest: known-good parameters,
+    /// then a Gaussian process over the canonical axes, until nothing more is to be gained
+    Hybrid,
+    /// Every frame is a trial: a simplex from a Latin hypercube over the printed axes
+    Paper,
+    /// Tries nothing: the default parameters in every frame
+    Default,
+}
+
+impl Policy {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::Paper => "paper",
+            Self::Default => "default",
+        }
+    }
+
+    fn axes(self) -> Space {
+        match self {
+            Self::Hybrid => Space::Canonical,
+            Self::Paper | Self::Default => Space::Printed,
+        }
+    }
+
+    fn search(self) -> &'static str {
+        match self {
+            Self::Hybrid => "gaussian-process",
+            Self::Paper | Self::Default => "nelder-mead",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -71,19 +111,27 @@ pub(crate) struct TuneArgs {
     /// What is made small
     #[arg(long, value_enum, default_value_t = MetricOption::Total)]
     metric: MetricOption,
-    /// The axes of the search
-    #[arg(long, value_enum, default_value_t = Space::Printed)]
-    space: Space,
-    /// Try known-good parameters first: the default, spatial splits, Morton order, large leaves
+    /// Frames that a tree serves, with the metric total: each bears its share of the build
+    #[arg(long, default_value_t = NonZeroU32::MIN)]
+    frames_per_tree: NonZeroU32,
+    /// How frames are used
+    #[arg(long, value_enum, default_value_t = Policy::Hybrid)]
+    policy: Policy,
+    /// The axes of the search; canonical with the policy hybrid, printed otherwise
+    #[arg(long, value_enum)]
+    space: Option<Space>,
+    /// Try known-good parameters first, as the policy hybrid always does: the default, spatial splits, Morton
+    /// order, large leaves
     #[arg(long)]
     portfolio: bool,
     /// A folder that keeps every trial; what is known there of the same machine, scene and settings is not
     /// measured again
     #[arg(long, value_name = "FOLDER")]
     store: Option<PathBuf>,
-    /// The search: random, nelder-mead (from a Latin hypercube) or gaussian-process
-    #[arg(long, default_value = "nelder-mead", value_parser = clap::builder::PossibleValuesParser::new(SEARCH_NAMES))]
-    search: String,
+    /// The search: random, nelder-mead (from a Latin hypercube) or gaussian-process; by default that of the
+    /// policy
+    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(SEARCH_NAMES))]
+    search: Option<String>,
     /// Rounds of the comparison with both baselines at the end
     #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
@@ -125,10 +173,12 @@ impl TuneArgs {
             scene: SceneOptions::built_in(scene),
             frames,
             metric: MetricOption::Total,
-            space: Space::Printed,
+            frames_per_tree: NonZeroU32::MIN,
+            policy: Policy::Hybrid,
+            space: None,
             portfolio: false,
             store: None,
-            search: "nelder-mead".into(),
+            search: None,
             rounds: 7,
             width: 640,
             height: 360,
@@ -142,6 +192,14 @@ impl TuneArgs {
     }
 }
 
+impl TuneArgs {
+    /// The name of the search.
+    fn search(&self) -> String {
+        let own = self.search.clone();
+        own.unwrap_or_else(|| self.policy.search().into())
+    }
+}
+
 /// Tunes; leaves log, report and picture.
 pub(crate) fn run(args: &TuneArgs) -> Result<(), Failure> {
     let cancel = cancel_on_interrupt()?;
@@ -152,14 +210,15 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     let base = args.parameters.applied_to(BuildParams::default())?;
     let stage = args.scene.prepare()?;
     let fixed = args.parameters.names();
-    let space = ParameterSpace::new(&base, &fixed, args.space.into())?;
+    let axes = args.space.unwrap_or(args.policy.axes());
+    let space = ParameterSpace::new(&base, &fixed, axes.into())?;
     let settings = Settings {
         width: args.width,
         height: args.height,
         path_length: args.path_length,
         metric: match args.metric {
             MetricOption::Render => Metric::Render,
-            MetricOption::Total => Metric::Total,
+            MetricOption::Total => Metric::of_frames_per_tree(args.frames_per_tree),
         },
         seed: args.seed,
         isa: args.run.isa(),
@@ -185,19 +244,37 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
             known.len()
         ));
     }
-    let search = search_by_name(&args.search).expect("the option accepts the names of the tuner");
-    let mut session = Session::new(
-        &stage.world,
-        stage.camera,
-        settings,
-        space,
-        search,
-        WallClock::start(),
-    )?
-    .with_known(known)?;
-    if args.portfolio {
-        session = session.with_starts(&tune::portfolio(&base))?;
-    }
+    let world = &stage.world;
+    let (camera, clock) = (stage.camera, WallClock::start());
+    let starts = tune::portfolio(&base);
+    let mut frames = match args.policy {
+        Policy::Hybrid | Policy::Default => {
+            let search = args.search();
+            let hybrid = Hybrid::new(
+                world,
+                camera,
+                settings,
+                space,
+                &base,
+                move || search_named(&search),
+                clock,
+            )?;
+            Frames::Tiles(match args.policy {
+                Policy::Default => hybrid.frozen(),
+                _ => hybrid.with_starts(&starts).with_known(known),
+            })
+        }
+        Policy::Paper => {
+            let search = search_named(&args.search());
+            let session = Session::new(world, camera, settings, space, search, clock)?;
+            let session = session.with_known(known)?;
+            Frames::Whole(if args.portfolio {
+                session.with_starts(&starts)?
+            } else {
+                session
+            })
+        }
+    };
 
     let folder = output::folder(&args.output)?;
     let file = |ending: &str| {
@@ -215,9 +292,10 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         frames: vec![],
         summary: None,
     };
-    search_frames(
+    render_frames(
         args,
-        &mut session,
+        &mut frames,
+        settings.metric,
         memory.as_mut(),
         &mut run,
         &mut log,
@@ -225,7 +303,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     )?;
     let searched_all = run.frames.len() == args.frames as usize;
 
-    if let Some(best) = session.incumbent() {
+    if let Some(best) = frames.incumbent() {
         // An interrupted search is compared too, unless the user interrupts again.
         let cancel = if searched_all {
             cancel
@@ -233,7 +311,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
             &CancelToken::new()
         };
         let bar = output::bar(args.rounds as usize + 1, "comparing");
-        let comparison = session.compare(&best, args.rounds as usize, cancel, |done, _| {
+        let comparison = frames.compare(&best, args.rounds as usize, cancel, |done, _| {
             bar.set_position(done as u64)
         })?;
         bar.finish_and_clear();
@@ -247,7 +325,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         output::note("no frame was finished: nothing to compare");
     }
     let picture = file("png");
-    write_image(&picture, &session.film().mean())?;
+    write_image(&picture, &frames.film().mean())?;
     let page = file("html");
     fs::write(&page, report::page(&run, Some(&fs::read(&picture)?)))?;
     if args.json {
@@ -275,7 +353,7 @@ fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {
         height: settings.height,
         path_length: settings.path_length,
         metric: settings.metric.name().into(),
-        search: args.search.clone(),
+        search: args.search(),
         seed: settings.seed,
         threads: rayon::current_num_threads(),
         instruction_set: settings.isa.name().into(),
@@ -284,38 +362,43 @@ fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {
             .named()
             .map(|(name, value)| (name.into(), value))
             .collect(),
-        policy: None,
-        frames_per_tree: None,
+        policy: Some(args.policy.name().into()),
+        frames_per_tree: settings
+            .metric
+            .frames_per_tree()
+            .map(|frames| frames.get().into()),
     }
 }
 
-/// Renders the frames of the search, each logged when it is done.
-fn search_frames(
+/// Renders the frames, each logged when it is done.
+fn render_frames(
     args: &TuneArgs,
-    session: &mut Session<'_, WallClock>,
+    frames: &mut Frames<'_>,
+    metric: Metric,
     mut memory: Option<&mut Memory>,
     run: &mut RunRecord,
     log: &mut RunLog,
     cancel: &CancelToken,
 ) -> Result<(), Failure> {
-    let metric = session.settings().metric;
     let bar = output::bar(args.frames as usize, "tuning");
     for frame in 0..args.frames as usize {
-        let best = session.incumbent_cost_ms();
         let mut begun = None;
-        let report = session.frame_told(cancel, |trial| {
+        let done = frames.frame(frame, metric, cancel, |trial| {
             begun = memory.as_deref_mut().map(|memory| {
                 let stamp = memory.begins(memory::now()?, trial)?;
                 Ok::<_, Failure>(stamp)
             });
         })?;
+        let (record, ended) = match done {
+            Some(done) => (Some(done.record), Some(done.ended)),
+            None => (None, None),
+        };
         if let (Some(memory), Some(stamp)) = (memory.as_deref_mut(), begun.transpose()?) {
-            memory.ended(memory::now()?, stamp, report.as_ref(), metric)?;
+            memory.ended(memory::now()?, stamp, ended, metric)?;
         }
-        let Some(report) = report else {
+        let Some(record) = record else {
             break;
         };
-        let record = frame_record(frame, &report, metric, best);
         log.frame(&record)?;
         if !args.json {
             bar.suspend(|| output::line(frame_line(&record)))?;
@@ -327,30 +410,9 @@ fn search_frames(
     Ok(())
 }
 
-fn frame_record(
-    frame: usize,
-    report: &FrameReport,
-    metric: Metric,
-    best: Option<f64>,
-) -> FrameRecord {
-    let times = report.outcome.as_ref().ok();
-    let cost_ms = times.map(|times| times.cost(metric) * 1e3);
-    FrameRecord {
-        frame,
-        config: tune::described(&report.params),
-        build_ms: times.map(|times| milliseconds(times.build)),
-        render_ms: times.map(|times| milliseconds(times.render)),
-        cost_ms,
-        failure: report.outcome.as_ref().err().map(ToString::to_string),
-        incumbent_cost_ms: match (best, cost_ms) {
-            (Some(best), Some(cost)) => Some(best.min(cost)),
-            (best, cost) => best.or(cost),
-        },
-        is_incumbent: report.is_incumbent,
-        frame_ms: None,
-        probe: None,
-        reason: None,
-    }
+/// A search by one of the names that the option accepts.
+fn search_named(name: &str) -> Box<dyn Search> {
+    search_by_name(name).expect("the option accepts the names of the tuner")
 }
 
 /// One frame on one line; a star marks a new incumbent.
@@ -361,8 +423,16 @@ fn frame_line(record: &FrameRecord) -> String {
         .iter()
         .map(|(name, value)| format!("{name}={value}"))
         .collect();
+    let probe = record.probe.as_ref().map_or_else(String::new, |probe| {
+        format!(
+            "  {} at {:.3} on {:.0} % of the tiles",
+            probe.decision,
+            probe.ratio,
+            100.0 * probe.share
+        )
+    });
     format!(
-        "{:>4}{} build {:>7} render {:>7} cost {:>7} best {:>7} ms  {}{}",
+        "{:>4}{} build {:>7} render {:>7} cost {:>7} best {:>7} ms  {}{}{probe}",
         record.frame,
         if record.is_incumbent { '*' } else { ' ' },
         time(record.build_ms),

@@ -357,7 +357,10 @@ mod tests {
             panic!("this is a frame");
         };
         assert_eq!(frame.cost_ms, Some(6.5));
-        assert_eq!((frame.frame_ms, frame.probe, frame.reason), (None, None, None));
+        assert_eq!(
+            (frame.frame_ms, frame.probe, frame.reason),
+            (None, None, None)
+        );
     }
 
     #[test]

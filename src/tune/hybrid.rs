@@ -19,7 +19,7 @@
 mod frame;
 mod trial;
 
-use std::{collections::HashMap, time::Duration};
+use std::{collections::HashMap, fmt, time::Duration};
 
 use raywright_bvh::{BuildParams, Bvh};
 use raywright_imaging::{Camera, CancelToken, Film};
@@ -31,7 +31,7 @@ use super::{
     probe::{Decision, INTERRUPTED, ProbeRatio},
     session::TrialFailure,
     space::ParameterSpace,
-    stage::{Clock, SessionError, Settings, Stage, add_frame},
+    stage::{Clock, FrameTimes, SessionError, Settings, Stage, add_frame},
 };
 use frame::Frame;
 
@@ -89,8 +89,9 @@ pub struct Candidate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Probed {
-    /// Time to build its tree; 0 if it was the incumbent's.
-    pub build: Duration,
+    /// What a frame with it would take: its build as measured (that of the incumbent if it is the same), and
+    /// rendering as its tiles say.
+    pub times: FrameTimes,
     /// Time to render over that of the incumbent, in this frame.
     pub ratio: ProbeRatio,
     /// The cost by the metric over that of the incumbent, all probes of it together, and its bounds.
@@ -121,12 +122,21 @@ impl Incumbent {
     }
 }
 
+/// Makes searches that have not begun.
+struct MakeSearch(Box<dyn Fn() -> Box<dyn Search> + Send + Sync>);
+
+impl fmt::Debug for MakeSearch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str((self.0)().name())
+    }
+}
+
 /// A tuning run whose candidates are tried on tiles.
 #[derive(Debug)]
 pub struct Hybrid<'a, C> {
     stage: Stage<'a, C>,
     space: ParameterSpace,
-    search: fn() -> Box<dyn Search>,
+    search: MakeSearch,
     tuner: Tuner,
     first: BuildParams,
     starts: Vec<BuildParams>,
@@ -144,6 +154,8 @@ pub struct Hybrid<'a, C> {
     quiet: u32,
     fruitless: u32,
     is_searching: bool,
+    /// Whether nothing is ever tried.
+    is_frozen: bool,
     detector: ChangeDetector,
     /// What is to be tried to see whether something has changed, and the logarithm of what its cost was over
     /// that of the incumbent.
@@ -163,7 +175,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         settings: Settings,
         space: ParameterSpace,
         first: &BuildParams,
-        search: fn() -> Box<dyn Search>,
+        search: impl Fn() -> Box<dyn Search> + Send + Sync + 'static,
         clock: C,
     ) -> Result<Self, SessionError> {
         let stage = Stage::checked(world, camera, settings, clock)?;
@@ -173,7 +185,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             tiles: Vec::new(),
             stage,
             space,
-            search,
+            search: MakeSearch(Box::new(search)),
             tuner,
             first: *first,
             starts: Vec::new(),
@@ -186,10 +198,18 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             quiet: 0,
             fruitless: 0,
             is_searching: true,
+            is_frozen: false,
             detector: ChangeDetector::new(LEAST_NOISE),
             check: None,
             begun: 0,
         })
+    }
+
+    /// The same run, in which nothing is tried: all frames with the first parameters.
+    #[must_use]
+    pub fn frozen(mut self) -> Self {
+        (self.is_searching, self.is_frozen) = (false, true);
+        self
     }
 
     /// The same run with parameters that are tried before the search proposes any, in this order.
@@ -370,6 +390,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
 
     /// What is tried in the next frame.
     fn next_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
+        if self.is_frozen {
+            return Ok(None);
+        }
         if let Some((config, _)) = &self.check {
             return Ok(Some(self.tuner.ask_for(config)));
         }
@@ -453,7 +476,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         starts.extend(portfolio.filter_map(|params| self.space.config(params).ok()));
         self.begun += 1;
         let seed = self.stage.settings.seed.wrapping_add(self.begun);
-        self.tuner = Tuner::new(self.space.space().clone(), (self.search)(), seed);
+        self.tuner = Tuner::new(self.space.space().clone(), (self.search.0)(), seed);
         let cost = self.unit * incumbent.log_cost.exp();
         let config = self.space.config(&incumbent.params);
         if let Ok(config) = config {

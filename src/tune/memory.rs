@@ -13,7 +13,7 @@ use raywright_tuner::{
     },
 };
 
-use super::{FrameReport, FrameTimes, Metric};
+use super::{FrameTimes, Metric};
 
 /// Seconds of building and rendering, as measures of outcomes.
 const MEASURES: [&str; 2] = ["build_s", "render_s"];
@@ -113,7 +113,8 @@ impl Memory {
         self.writer.append(time, open)
     }
 
-    /// Notes how the trial ended that began as `trial`; `None` if it was cancelled.
+    /// Notes how the trial ended that began as `trial`: what a frame takes, or why nothing was measured;
+    /// `None` if it was cancelled.
     ///
     /// # Errors
     /// [`StoreError`].
@@ -121,15 +122,12 @@ impl Memory {
         &mut self,
         time: f64,
         trial: Stamp,
-        report: Option<&FrameReport>,
+        ended: Option<Result<FrameTimes, String>>,
         metric: Metric,
     ) -> Result<(), StoreError> {
-        let outcome = match report.map(|report| &report.outcome) {
+        let outcome = match ended {
             None => TrialOutcome::new(trial, Outcome::Cancelled),
-            Some(Err(failure)) => {
-                let reason = failure.to_string();
-                TrialOutcome::new(trial, Outcome::Failed { reason })
-            }
+            Some(Err(reason)) => TrialOutcome::new(trial, Outcome::Failed { reason }),
             Some(Ok(FrameTimes { build, render })) => {
                 let times = [build.as_secs_f64(), render.as_secs_f64()];
                 let cost = metric.cost(times[0], times[1]);

@@ -12,7 +12,7 @@ use super::{Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, fram
 use crate::tune::{
     probe::{Costs, Decision, Pair, ProbeRatio, SHARES, spread_order},
     session::TrialFailure,
-    stage::{Clock, SessionError},
+    stage::{Clock, FrameTimes, SessionError},
 };
 
 /// A part of a probe is given up after so many times what the whole frame takes with the incumbent.
@@ -27,6 +27,15 @@ struct Probe {
     decision: Decision,
     candidate_times: Vec<(usize, f64)>,
     incumbent_times: Vec<(usize, f64)>,
+}
+
+/// What a frame with a candidate would take.
+fn times(build: f64, costs: &Costs, ratio: ProbeRatio) -> FrameTimes {
+    let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+    FrameTimes {
+        build: duration(build),
+        render: duration(costs.render * ratio.log.exp()),
+    }
 }
 
 impl<C: Clock> Hybrid<'_, C> {
@@ -115,7 +124,7 @@ impl<C: Clock> Hybrid<'_, C> {
         frame.times.extend(&probe.incumbent_times);
         let cost = self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp());
         Ok(Probed {
-            build: Duration::ZERO,
+            times: times(incumbent.build(), costs, probe.ratio),
             ratio: probe.ratio,
             cost_ratio: costs.bounds(probe.ratio),
             cost,
@@ -151,7 +160,7 @@ impl<C: Clock> Hybrid<'_, C> {
         let share = probe.candidate_times.len() as f64 / self.tiles.len() as f64;
         let other_share = probe.incumbent_times.len() as f64 / self.tiles.len() as f64;
         let probed = Probed {
-            build,
+            times: times(build.as_secs_f64(), &costs, probe.ratio),
             ratio: probe.ratio,
             cost_ratio: costs.bounds(probe.all),
             cost: self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp()),
