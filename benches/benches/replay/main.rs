@@ -129,7 +129,10 @@ fn beside_peers(judged: &Figures, figures: &[Figures], title: &str, goals: &mut 
             let is_ahead = own < other;
             let word = if is_ahead { "ahead" } else { "not ahead" };
             println!("{word} of every peer in {what}: {figures}");
-            goals.check(format!("ahead of every peer in {what}: {figures}"), is_ahead);
+            goals.check(
+                format!("ahead of every peer in {what}: {figures}"),
+                is_ahead,
+            );
         }
     }
 }

@@ -208,9 +208,9 @@ fn scene_problems(
         let frame = frames * median(times().map(|times| times.reference));
         let build = median(times().map(|times| times.reference_build));
         let costs = |times: &Times| {
-            let render = times.render.map_or(f64::from(SLOWEST_TRIAL), |render| {
-                render / times.reference
-            });
+            let render = times
+                .render
+                .map_or(f64::from(SLOWEST_TRIAL), |render| render / times.reference);
             [render, (frame * render + times.build) / (frame + build)]
         };
         let weak = own.iter().find(|line| line.source == WEAK_SOURCE);

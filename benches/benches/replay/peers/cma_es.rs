@@ -20,7 +20,10 @@ pub(super) fn run(start: &[f64], seed: u64, objective: &Objective) {
         cost.map_or(f64::NAN, |cost| cost * (1.0 + outside))
     };
     // It ends at a cost that is no number.
-    if let Ok(mut state) = CMAESOptions::new(start.to_vec(), STEP).seed(seed).build(cost) {
+    if let Ok(mut state) = CMAESOptions::new(start.to_vec(), STEP)
+        .seed(seed)
+        .build(cost)
+    {
         state.run();
     }
 }

@@ -24,7 +24,11 @@ const CRATES: [Method; 6] = [
     Method::peer("3 starts + crate tpe", tpe::NAME, PORTFOLIO),
     Method::peer("strong default + crate cmaes", cma_es::NAME, STRONG),
     Method::peer("3 starts + crate cmaes", cma_es::NAME, PORTFOLIO),
-    Method::peer("strong default + crate argmin, simplex", simplex::NAME, STRONG),
+    Method::peer(
+        "strong default + crate argmin, simplex",
+        simplex::NAME,
+        STRONG,
+    ),
     Method::peer("3 starts + crate argmin, simplex", simplex::NAME, PORTFOLIO),
 ];
 

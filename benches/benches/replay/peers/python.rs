@@ -5,6 +5,8 @@
 //! is kept here, and the search proposes the middle of the cube from then on.
 
 use std::{
+    env,
+    ffi::OsStr,
     io::{BufRead, BufReader, Write},
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -14,6 +16,8 @@ use raywright_tuner::{Config, Estimate, Kind, Param, Proposal, Scale, Search, Sp
 use serde_json::{Map, Value as Json, json};
 
 const SCRIPT: &str = include_str!("../peers.py");
+/// Names another Python than [`PROGRAM`].
+const VARIABLE: &str = "RAYWRIGHT_PEERS_PYTHON";
 const PROGRAM: &str = "python3";
 
 /// A running script.
@@ -26,15 +30,15 @@ struct Process {
 }
 
 impl Process {
-    fn start() -> Result<Process, String> {
-        let mut child = Command::new(PROGRAM)
+    fn start(program: &OsStr) -> Result<Process, String> {
+        let mut child = Command::new(program)
             .args(["-c", SCRIPT])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             // Warnings of libraries; errors are answers.
             .stderr(Stdio::null())
             .spawn()
-            .map_err(|error| format!("{PROGRAM}: {error}"))?;
+            .map_err(|error| format!("{}: {error}", program.display()))?;
         let answers = child.stdout.take().ok_or("no pipe")?;
         Ok(Process {
             requests: child.stdin.take(),
@@ -78,18 +82,22 @@ pub(super) struct Python {
 }
 
 impl Python {
-    /// The first Python of the path, if it has a sampler.
+    /// The Python that [`VARIABLE`] names or else the first of the path, if it has a sampler.
     pub(super) fn open() -> Result<Python, String> {
-        let output = Command::new(PROGRAM)
+        let program = env::var_os(VARIABLE).unwrap_or_else(|| PROGRAM.into());
+        let output = Command::new(&program)
             .args(["-c", SCRIPT, "--check"])
             .output()
-            .map_err(|error| format!("{PROGRAM}: {error}"))?;
+            .map_err(|error| format!("{}: {error}", program.display()))?;
         let text = String::from_utf8_lossy(&output.stdout);
         let names: Vec<String> = text.lines().map(str::to_owned).collect();
         if names.is_empty() {
-            return Err(format!("{PROGRAM} has none of them"));
+            return Err(format!(
+                "{} has none of them; {VARIABLE} names another",
+                program.display()
+            ));
         }
-        let process = Arc::new(Mutex::new(Process::start()?));
+        let process = Arc::new(Mutex::new(Process::start(&program)?));
         Ok(Python { names, process })
     }
 
@@ -147,7 +155,11 @@ impl Sampler {
         let values: Option<Vec<(&str, Value)>> = values
             .iter()
             .map(|(name, value)| {
-                let param = self.space.params().iter().find(|param| param.name == *name)?;
+                let param = self
+                    .space
+                    .params()
+                    .iter()
+                    .find(|param| param.name == *name)?;
                 let value = match param.kind {
                     Kind::Bool => Value::Bool(value.as_bool()?),
                     Kind::Integer { .. } | Kind::Ordinal(_) => Value::Integer(value.as_i64()?),
@@ -211,7 +223,11 @@ fn described(param: &Param) -> Json {
     };
     own["name"] = json!(param.name);
     if let Some(condition) = &param.active_if {
-        let values: Vec<Json> = condition.values.iter().map(|&value| number(value)).collect();
+        let values: Vec<Json> = condition
+            .values
+            .iter()
+            .map(|&value| number(value))
+            .collect();
         own["when"] = json!({"name": condition.param, "values": values});
     }
     own
