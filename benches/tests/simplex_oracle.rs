@@ -11,17 +11,18 @@ use argmin::{
     core::{CostFunction, Error, Executor},
     solver::neldermead::NelderMead,
 };
-use raywright_tuner::{Estimate, Search, search_by_name};
+use raywright_tuner::{Estimate, search_by_name};
 
 const SEEDS: u64 = 20;
 const AXES: usize = 2;
 /// Points of our search, repeated measurements included.
-const PROPOSALS: usize = 400;
+const PROPOSALS: usize = 1000;
 const ITERATIONS: u64 = 200;
 /// What counts as the optimum: nearer than the extent at which our simplex counts as collapsed.
 const REACHED: f64 = 1e-4;
-/// Least number of points behind the first simplex that have to be compared over all seeds, 20 in each.
-const COMPARED: usize = 20 * SEEDS as usize;
+/// Least number of points behind the first simplex that have to be compared over all seeds: in the valley the
+/// next point soon lies outside of the cube.
+const COMPARED: usize = 150;
 
 type Cost = fn(&[f64]) -> f64;
 
@@ -40,7 +41,7 @@ fn quadratic(point: &[f64]) -> f64 {
 /// A point and the name of the move that led to it.
 type Visit = (Vec<f64>, &'static str);
 
-/// Points of our simplex whose cost was not known before.
+/// Points of our simplex, without measuring again what has just been measured or is best.
 fn ours(cost: Cost, seed: u64) -> Vec<Visit> {
     let mut search = search_by_name("nelder-mead").expect("it is one of ours");
     search.begin(&[0.0; AXES], seed);
@@ -53,7 +54,8 @@ fn ours(cost: Cost, seed: u64) -> Vec<Visit> {
             noise: 0.0,
         };
         search.observe(Some(ticket), &proposal.point, estimate);
-        if !visits.iter().any(|(point, _)| *point == proposal.point) {
+        let last = visits.last().map(|(point, _)| point);
+        if proposal.step != "resample" && last != Some(&proposal.point) {
             visits.push((proposal.point, proposal.step));
         }
     }

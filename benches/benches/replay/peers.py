@@ -82,12 +82,11 @@ class Optuna:
 
 
 class Smac:
-    """A random forest with expected improvement, as for hyperparameters, or a Gaussian process, as for black
-    boxes."""
+    """A random forest with expected improvement: what SMAC recommends for hyperparameters."""
 
-    def __init__(self, sampler, task):
+    def __init__(self, _sampler, task):
         import ConfigSpace as cs
-        from smac import BlackBoxFacade, HyperparameterOptimizationFacade, Scenario
+        from smac import HyperparameterOptimizationFacade, Scenario
 
         self.cs = cs
         self.space = task["space"]
@@ -116,10 +115,11 @@ class Smac:
             seed=task["seed"],
             output_directory=self.folder.name,
         )
-        facade = HyperparameterOptimizationFacade if sampler == "smac-forest" else BlackBoxFacade
-        self.smac = facade(scenario, lambda config, seed=0: 0.0, overwrite=True, logging_level=False)
+        self.smac = HyperparameterOptimizationFacade(
+            scenario, lambda config, seed=0: 0.0, overwrite=True, logging_level=False
+        )
         self.configspace = space
-        self.seed = None
+        self.seed = 0
 
     def ask(self):
         info = self.smac.ask()
@@ -133,8 +133,6 @@ class Smac:
         by_name = {param["name"]: param for param in self.space}
         values = {name: internal(by_name[name], value) for name, value in config.items()}
         own = self.cs.Configuration(self.configspace, values=values)
-        if self.seed is None:
-            self.seed = self.smac.intensifier.get_seeds()[0] if hasattr(self.smac.intensifier, "get_seeds") else 0
         self.smac.tell(TrialInfo(own, seed=self.seed), TrialValue(cost=cost), save=False)
 
 
@@ -159,7 +157,6 @@ SAMPLERS = {
     "optuna-tpe-multivariate": (Optuna, ["optuna"]),
     "optuna-gp": (Optuna, ["optuna", "torch", "scipy"]),
     "smac-forest": (Smac, ["smac", "ConfigSpace"]),
-    "smac-gp": (Smac, ["smac", "ConfigSpace"]),
 }
 
 

@@ -7,7 +7,7 @@
 //! Invariants: frames of a scene were made in one way; no configuration is there twice.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     error::Error,
     fs::{self, File},
     io::Read,
@@ -192,7 +192,7 @@ fn scene_problems(
         _ => "",
     };
     let times = lines.iter().filter_map(|line| line.times.as_ref());
-    let cameras: HashSet<&str> = times.map(|times| times.camera.as_str()).collect();
+    let cameras: BTreeSet<&str> = times.map(|times| times.camera.as_str()).collect();
     let mut problems = Vec::new();
     for camera in cameras {
         let is_own = |line: &&Line| {
