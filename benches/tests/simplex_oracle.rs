@@ -20,9 +20,10 @@ const PROPOSALS: usize = 1000;
 const ITERATIONS: u64 = 200;
 /// What counts as the optimum: nearer than the extent at which our simplex counts as collapsed.
 const REACHED: f64 = 1e-4;
-/// Least number of points behind the first simplex that have to be compared over all seeds: in the valley the
-/// next point soon lies outside of the cube.
-const COMPARED: usize = 150;
+/// Size of a first simplex that does not soon step out of the cube.
+const SMALL: f64 = 0.2;
+/// Least number of points behind the first simplex that have to be compared over all seeds.
+const COMPARED: usize = 20 * SEEDS as usize;
 
 type Cost = fn(&[f64]) -> f64;
 
@@ -41,22 +42,38 @@ fn quadratic(point: &[f64]) -> f64 {
 /// A point and the name of the move that led to it.
 type Visit = (Vec<f64>, &'static str);
 
+/// Where our simplex begins.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum First {
+    /// At its hypercube.
+    Wide,
+    /// At the hypercube drawn together: its own points fail, and these are known from elsewhere.
+    Small,
+}
+
 /// Points of our simplex, without measuring again what has just been measured or is best.
-fn ours(cost: Cost, seed: u64) -> Vec<Visit> {
+fn ours(cost: Cost, seed: u64, first: First) -> Vec<Visit> {
     let mut search = search_by_name("nelder-mead").expect("it is one of ours");
     search.begin(&[0.0; AXES], seed);
     let mut visits: Vec<Visit> = Vec::new();
     for ticket in 0..PROPOSALS as u64 {
         let proposal = search.propose(ticket);
-        let estimate = Estimate {
+        let mut estimate = Estimate {
             mean: cost(&proposal.point),
             samples: proposal.samples,
             noise: 0.0,
         };
+        let mut point = proposal.point.clone();
+        if first == First::Small && visits.len() <= AXES {
+            point.iter_mut().for_each(|x| *x = 0.5 + SMALL * (*x - 0.5));
+            estimate.mean = cost(&point);
+            search.observe(None, &point, estimate);
+            estimate.mean = f64::INFINITY;
+        }
         search.observe(Some(ticket), &proposal.point, estimate);
         let last = visits.last().map(|(point, _)| point);
-        if proposal.step != "resample" && last != Some(&proposal.point) {
-            visits.push((proposal.point, proposal.step));
+        if proposal.step != "resample" && last != Some(&point) {
+            visits.push((point, proposal.step));
         }
     }
     visits
@@ -112,7 +129,7 @@ fn both_make_the_same_moves() {
         let mut compared = 0;
         let mut steps: Vec<&str> = Vec::new();
         for seed in 0..SEEDS {
-            let own = ours(cost, seed);
+            let own = ours(cost, seed, First::Small);
             let other = theirs(cost, &own[..=AXES]);
             let pairs = own.iter().zip(&other).skip(AXES + 1);
             for (at, ((point, step), other)) in pairs.enumerate() {
@@ -142,7 +159,7 @@ fn both_reach_the_same_optimum_with_about_as_many_costs() {
     for (name, cost) in [("rosenbrock", rosenbrock as Cost), ("quadratic", quadratic)] {
         let (mut own_counts, mut other_counts) = (Vec::new(), Vec::new());
         for seed in 0..SEEDS {
-            let own = ours(cost, seed);
+            let own = ours(cost, seed, First::Wide);
             let other = theirs(cost, &own[..=AXES]);
             // A hypercube of points on one line spans no simplex, and argmin stays on it.
             if let Some(count) = reached(cost, other.iter()) {
