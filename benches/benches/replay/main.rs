@@ -8,13 +8,14 @@
 //!
 //! Peers search the same canonical space on the same problems and seeds, with our starts and without. Those
 //! that are slow have fewer seeds, as the table says; those of Python are left out where it has none of them.
+//! Where the interval of what is between ours and the nearest peer has both signs, nobody is ahead for sure.
 
 mod methods;
 #[cfg(feature = "peers")]
 mod peers;
 mod score;
 
-use std::{error::Error, time::Instant};
+use std::{error::Error, ops::Range, time::Instant};
 
 use raywright_benches::{
     goals::Goals,
@@ -30,12 +31,44 @@ const JUDGED_AT: [usize; 2] = [1, 3];
 /// Most percents of regret after 10 and 20 frames.
 const MOST_REGRET: [f64; 2] = [1.0, 0.5];
 
-/// Figures of a method over all problems, in percent.
-#[derive(Clone, Copy, Debug)]
-struct Figures {
+/// What a method did on all problems.
+#[derive(Clone, Debug)]
+struct Row {
     method: Method,
-    regret: [f64; TOLD.len()],
-    excess: [f64; TOLD.len()],
+    scores: Vec<Score>,
+}
+
+/// A figure of a search on a problem, as a logarithm.
+type Of = fn(&Score, usize) -> f64;
+
+const REGRET: Of = |score, at| score.regret[at];
+const EXCESS: Of = |score, at| score.excess[at];
+
+impl Row {
+    fn logs(&self, of: Of, at: usize) -> Vec<f64> {
+        self.scores.iter().map(|score| of(score, at)).collect()
+    }
+
+    /// In percent, over all problems.
+    fn figure(&self, of: Of, at: usize) -> f64 {
+        mean(&self.logs(of, at))
+    }
+
+    fn print(&self, seconds: f64) {
+        let [low, high] = interval(&self.logs(REGRET, 1));
+        let numbers = |of: Of, places: Range<usize>| -> String {
+            let figures = places.map(|at| format!(" {:6.1}", self.figure(of, at)));
+            figures.collect()
+        };
+        println!(
+            "{:40}{} [{low:5.1}, {high:5.1}]{}  {}  {:2} {seconds:7.1} s",
+            self.method.name,
+            numbers(REGRET, 0..2),
+            numbers(REGRET, 2..TOLD.len()),
+            numbers(EXCESS, 0..TOLD.len()),
+            self.method.seeds,
+        );
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -51,15 +84,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         for metric in Metric::ALL {
             let title = format!("{}, {}", set.name, metric.name());
             println!("\n{title}: regret after {TOLD:?} frames, %; excess, %; seeds");
-            let figures = table(&searches, set, metric)?;
-            let judged = figures.iter().find(|own| own.method.name == JUDGED);
+            let rows = table(&searches, set, metric)?;
+            let judged = rows.iter().find(|row| row.method.name == JUDGED);
             if let Some(judged) = judged {
                 for (at, most) in MOST_REGRET.into_iter().enumerate() {
-                    let (regret, frames) = (judged.regret[at], TOLD[at]);
+                    let (regret, frames) = (judged.figure(REGRET, at), TOLD[at]);
                     let what = format!("regret after {frames} frames, {title}: {regret:.3} %");
                     goals.check(format!("{what}, not {most}"), regret <= most);
                 }
-                beside_peers(judged, &figures, &title, &mut goals);
+                beside_peers(judged, &rows, &title, &mut goals);
             }
             fixed(&set.problems, metric, &title, &mut goals);
         }
@@ -69,12 +102,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Prints a row for each search.
-fn table(
-    searches: &Searches,
-    set: &DataSet,
-    metric: Metric,
-) -> Result<Vec<Figures>, Box<dyn Error>> {
-    let mut figures = Vec::new();
+fn table(searches: &Searches, set: &DataSet, metric: Metric) -> Result<Vec<Row>, Box<dyn Error>> {
+    let mut rows = Vec::new();
     for method in &searches.methods {
         let start = Instant::now();
         let scores = set
@@ -89,50 +118,38 @@ fn table(
             }
             scores => scores?,
         };
-        let told: [usize; TOLD.len()] = std::array::from_fn(|at| at);
-        let own = Figures {
+        let row = Row {
             method: *method,
-            regret: told.map(|at| mean(&scores, |score| score.regret[at])),
-            excess: told.map(|at| mean(&scores, |score| score.excess[at])),
+            scores,
         };
-        let [low, high] = interval(&scores, |score| score.regret[1]);
-        let numbers = |values: &[f64]| -> String {
-            let numbers = values.iter().map(|value| format!(" {value:6.1}"));
-            numbers.collect()
-        };
-        println!(
-            "{:40}{} [{low:5.1}, {high:5.1}]{}  {}  {:2} {:7.1} s",
-            method.name,
-            numbers(&own.regret[..2]),
-            numbers(&own.regret[2..]),
-            numbers(&own.excess),
-            method.seeds,
-            start.elapsed().as_secs_f64(),
-        );
-        figures.push(own);
+        row.print(start.elapsed().as_secs_f64());
+        rows.push(row);
     }
-    Ok(figures)
+    Ok(rows)
 }
 
-/// Whether a search of ours is ahead of every peer, in each figure by itself.
-fn beside_peers(judged: &Figures, figures: &[Figures], title: &str, goals: &mut Goals) {
-    type Of = fn(&Figures) -> &[f64; TOLD.len()];
-    let kinds: [(&str, Of); 2] = [("regret", |f| &f.regret), ("excess", |f| &f.excess)];
-    for (kind, of) in kinds {
+/// Whether a search of ours is ahead of every peer, in each figure by itself, and by how much of the costs.
+fn beside_peers(judged: &Row, rows: &[Row], title: &str, goals: &mut Goals) {
+    for (kind, of) in [("regret", REGRET), ("excess", EXCESS)] {
         for at in JUDGED_AT {
-            let peers = figures.iter().filter(|other| other.method.is_peer());
-            let least = peers.min_by(|a, b| of(a)[at].total_cmp(&of(b)[at]));
+            let peers = rows.iter().filter(|row| row.method.is_peer());
+            let figure = |row: &Row| row.figure(of, at);
+            let least = peers.min_by(|a, b| figure(a).total_cmp(&figure(b)));
             let Some(peer) = least else { return };
-            let (own, other) = (of(judged)[at], of(peer)[at]);
-            let what = format!("{kind} after {} frames, {title}", TOLD[at]);
-            let figures = format!("ours {own:.2} %, {} {other:.2} %", peer.method.name);
-            let is_ahead = own < other;
-            let word = if is_ahead { "ahead" } else { "not ahead" };
-            println!("{word} of every peer in {what}: {figures}");
-            goals.check(
-                format!("ahead of every peer in {what}: {figures}"),
-                is_ahead,
+            let (own, other) = (figure(judged), figure(peer));
+            let pairs = judged.logs(of, at).into_iter().zip(peer.logs(of, at));
+            let apart: Vec<f64> = pairs.map(|(own, other)| own - other).collect();
+            let [low, high] = interval(&apart);
+            let what = format!(
+                "ahead of every peer in {kind} after {} frames, {title}: ours {own:.2} %, {} {other:.2} %, \
+                 apart {:+.2} [{low:+.2}, {high:+.2}] %",
+                TOLD[at],
+                peer.method.name,
+                mean(&apart)
             );
+            let is_ahead = own < other;
+            println!("{}{what}", if is_ahead { "" } else { "not " });
+            goals.check(what, is_ahead);
         }
     }
 }

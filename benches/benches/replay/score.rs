@@ -71,29 +71,23 @@ pub(crate) fn score(
     Ok(sum)
 }
 
-/// The geometric mean over problems, less 1, in percent.
-pub(crate) fn mean(scores: &[Score], of: impl Fn(&Score) -> f64) -> f64 {
-    let sum: f64 = scores.iter().map(of).sum();
-    100.0 * ((sum / scores.len() as f64).exp() - 1.0)
+/// The geometric mean over problems, less 1, in percent, of their logarithms.
+pub(crate) fn mean(logs: &[f64]) -> f64 {
+    100.0 * ((logs.iter().sum::<f64>() / logs.len() as f64).exp() - 1.0)
 }
 
 /// 95 % of such means over as many problems, drawn again and again from them (Efron, 1979).
-pub(crate) fn interval(scores: &[Score], of: impl Fn(&Score) -> f64) -> [f64; 2] {
+pub(crate) fn interval(logs: &[f64]) -> [f64; 2] {
     const DRAWS: usize = 2000;
     let mut state = 1_u64;
+    let mut draw = |_: &f64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        logs[(state >> 33) as usize % logs.len()]
+    };
     let mut means: Vec<f64> = (0..DRAWS)
-        .map(|_| {
-            let drawn: Vec<Score> = scores
-                .iter()
-                .map(|_| {
-                    state = state
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1);
-                    scores[(state >> 33) as usize % scores.len()]
-                })
-                .collect();
-            mean(&drawn, &of)
-        })
+        .map(|_| mean(&logs.iter().map(&mut draw).collect::<Vec<f64>>()))
         .collect();
     means.sort_by(f64::total_cmp);
     [means[DRAWS / 40], means[DRAWS - DRAWS / 40]]

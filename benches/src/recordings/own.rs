@@ -277,9 +277,11 @@ mod tests {
     use super::*;
     use crate::recordings::{Metric, SpaceKind, data_sets};
 
-    /// A table as the recorder writes it, of the given rows: number, source, parameters, and for each
-    /// camera render and reference; none: the build was refused. All builds take 2 ms, the reference 1 ms.
-    fn text(rows: &[(usize, &str, BuildParams, Option<[(f64, f64); 2]>)]) -> String {
+    /// Number, source, parameters, and for each camera render and reference; none: the build was refused.
+    type TestRow<'a> = (usize, &'a str, BuildParams, Option<[(f64, f64); 2]>);
+
+    /// A table of such rows as the recorder writes it. All builds take 2 ms, the reference 1 ms.
+    fn text(rows: &[TestRow<'_>]) -> String {
         let default = described(&BuildParams::default());
         let names: Vec<&str> = default.iter().map(|(name, _)| name.as_str()).collect();
         let names = names.join(",");
