@@ -6,7 +6,7 @@ use crate::report::record::{ComparisonRow, FrameRecord};
 use crate::report::svg::bars::{Bar, bars};
 use crate::report::svg::marker::Marker;
 use crate::report::svg::parallel::{Strand, parallel_coordinates};
-use crate::report::svg::xy::{Layer, Mark, Plot};
+use crate::report::svg::xy::{Layer, Mark, Plot, Range};
 use crate::report::svg::{Size, color};
 
 const WIDE: Size = Size {
@@ -110,6 +110,7 @@ pub(super) fn history(
         description: "Cost of every frame in the order of the search",
         x_label: "frame",
         y_label: "cost (ms)",
+        y_range: Range::Fitted,
         layers,
     }
     .draw()
@@ -143,6 +144,7 @@ pub(super) fn build_and_render(trials: &[Trial<'_>], compared: &[ComparisonRow])
         description: "Build time and render time of every frame",
         x_label: "build (ms)",
         y_label: "render (ms)",
+        y_range: Range::Fitted,
         layers,
     }
     .draw()
@@ -161,6 +163,7 @@ pub(super) fn leaf_sizes(trials: &[Trial<'_>]) -> Option<String> {
             description: "Leaf sizes of every frame",
             x_label: "min_leaf_size (primitives)",
             y_label: "max_leaf_size (primitives)",
+            y_range: Range::Fitted,
             layers: vec![layer],
         }
         .draw()
