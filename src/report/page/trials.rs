@@ -49,6 +49,22 @@ pub(super) fn measured(frames: &[FrameRecord]) -> Vec<Trial<'_>> {
         .collect()
 }
 
+/// At most about `limit` of the trials, in their order: every new incumbent, the best tenth of the
+/// limit, and of the others every second, third, …
+pub(super) fn thinned<'a>(trials: &[Trial<'a>], limit: usize) -> Vec<Trial<'a>> {
+    if trials.len() <= limit {
+        return trials.to_vec();
+    }
+    let mut costs: Vec<f64> = trials.iter().map(|trial| trial.cost_ms).collect();
+    costs.sort_by(f64::total_cmp);
+    let good = costs[limit / 10];
+    let stride = trials.len().div_ceil(limit);
+    let kept = trials.iter().enumerate().filter(|(index, trial)| {
+        index % stride == 0 || trial.cost_ms < good || trial.frame.is_incumbent
+    });
+    kept.map(|(_, trial)| *trial).collect()
+}
+
 /// The failed frames by reason, the most frequent first.
 pub(super) fn failures(frames: &[FrameRecord]) -> Vec<Failure> {
     let mut failures: Vec<Failure> = Vec::new();
@@ -168,6 +184,22 @@ mod tests {
         assert_eq!(ranks(&[5.0]), [0.0]);
         assert_eq!(ranks(&[7.0, 7.0, 7.0]), [0.0, 0.0, 0.0]);
         assert_eq!(ranks(&[]), [0.0; 0]);
+    }
+
+    #[test]
+    fn of_many_trials_the_best_and_some_others_are_kept() {
+        let run = example::run(3000);
+        let trials = measured(&run.frames);
+        let kept = thinned(&trials, 300);
+        assert!((270..=350).contains(&kept.len()), "{}", kept.len());
+        for trial in &trials {
+            let is_kept = kept.iter().any(|one| one.frame.frame == trial.frame.frame);
+            assert!(is_kept || (trial.rank > 0.0 && !trial.frame.is_incumbent));
+        }
+        assert_eq!(thinned(&trials[..10], 300).len(), 10);
+        // Equal costs are no reason to keep all.
+        let equal = with_costs(&[5.0; 1000]);
+        assert!(thinned(&measured(&equal), 100).len() <= 110);
     }
 
     #[test]
