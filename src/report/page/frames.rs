@@ -1,239 +1,290 @@
-//! What the frames of a run were, and how long each took: the timeline.
+//! What the user waited for: the time of every whole frame, and what the frame was used for.
 //!
-//! Times are those of whole frames, since a user waits for frames, not for trials. A frame is a
-//! *trial* if one configuration rendered all of it, a *probe* if a candidate was tried on some of its
-//! tiles, *alone* if nothing was tried beside the incumbent, or *failed*. Frames are put together in
-//! columns of equally many where there are more of them than the plot can tell apart.
+//! A frame is not a trial. In a probed frame most tiles are rendered with the incumbent, so that its
+//! time says little about the candidate; here stands the time, with the search the candidate.
 
+use std::ops::Range as Part;
+
+use super::{figure, plots::compared_levels};
 use crate::report::number;
-use crate::report::record::{ComparisonRow, FrameRecord};
-use crate::report::svg::xy::{Column, Layer, Plot, Range};
+use crate::report::record::{ComparisonRow, FrameRecord, RunRecord};
+use crate::report::svg::Size;
+use crate::report::svg::marker::Marker;
+use crate::report::svg::xy::{Column, Layer, Mark, Plot, Range};
 
-use super::plots::{self, WIDE};
-
-/// More columns would be narrower than two pixels.
+const SIZE: Size = Size {
+    width: 860.0,
+    height: 400.0,
+};
+/// Columns that a plot has room for; of more frames neighbours share a column.
 const MOST_COLUMNS: usize = 400;
-/// Columns are cut beyond so many times what most frames or the defaults take.
-const CUT: f64 = 2.5;
+/// The axis ends this far above what 95 % of the frames and the baselines take…
+const HEADROOM: f64 = 1.25;
+/// …if the slowest frame takes more than this many times as long.
+const CUT_FROM: f64 = 1.6;
 
-/// What a frame was.
+/// What a frame was used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// All of it was rendered with the configuration that was tried.
+    /// All of it was rendered with the incumbent, nothing was tried.
+    Incumbent,
+    /// All of it was rendered with what was tried.
     Trial,
-    /// The incumbent rendered it, and a candidate some of its tiles.
+    /// Some tiles were, and the incumbent stayed.
     Probe,
-    /// Nothing was tried.
-    Alone,
-    /// What was tried could not be built, or was given up.
+    /// Some tiles were, and what was tried became the incumbent.
+    AcceptedProbe,
+    /// What was tried could not be built or was given up.
     Failed,
 }
 
 impl Kind {
-    /// In the order in which a column stacks them, with their colours.
-    const STACKED: [(Kind, &'static str, &'static str); 4] = [
-        (Kind::Alone, "incumbent alone", "plain"),
-        (Kind::Probe, "with a probe", "s3"),
-        (Kind::Trial, "trial of a whole frame", "s0"),
-        (Kind::Failed, "with a failure", "bad"),
+    const ALL: [Self; 5] = [
+        Self::Incumbent,
+        Self::Trial,
+        Self::Probe,
+        Self::AcceptedProbe,
+        Self::Failed,
     ];
-}
 
-/// The kind of a frame.
-pub(super) fn kind(frame: &FrameRecord) -> Kind {
-    let is_asked = frame
-        .reason
-        .as_ref()
-        .is_some_and(|reason| reason != "incumbent");
-    let probe = frame.probe.as_ref();
-    if frame.failure.is_some() || probe.is_some_and(|probe| probe.decision == "failed") {
-        Kind::Failed
-    } else if probe.is_some() {
-        Kind::Probe
-    } else if frame.frame_ms.is_some() && !is_asked && !frame.is_incumbent {
-        Kind::Alone
-    } else if frame.cost_ms.is_none_or(|cost| !cost.is_finite()) {
-        Kind::Failed
-    } else {
-        Kind::Trial
+    pub(super) fn of(frame: &FrameRecord) -> Self {
+        let decision = frame.probe.as_ref().map(|probe| probe.decision.as_str());
+        if frame.failure.is_some() || decision == Some("failed") {
+            Self::Failed
+        } else if decision == Some("accepted") {
+            Self::AcceptedProbe
+        } else if decision.is_some() {
+            Self::Probe
+        } else if frame.reason.as_deref() == Some("incumbent") {
+            Self::Incumbent
+        } else {
+            Self::Trial
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Incumbent => "incumbent alone",
+            Self::Trial => "trial",
+            Self::Probe => "probe",
+            Self::AcceptedProbe => "probe, accepted",
+            Self::Failed => "failed trial",
+        }
+    }
+
+    fn class(self) -> &'static str {
+        match self {
+            Self::Incumbent => "kind-incumbent",
+            Self::Trial => "kind-trial",
+            Self::Probe => "kind-probe",
+            Self::AcceptedProbe => "kind-accepted",
+            Self::Failed => "bad",
+        }
     }
 }
 
-/// How long a frame took, in milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FrameTime {
-    /// Build and everything.
-    pub(super) whole: f64,
-    /// Its part in which trees were built, as far as is known.
-    pub(super) build: f64,
+/// What the whole frame took: as recorded, or build and render where frames had no other part.
+pub(super) fn whole_ms(frame: &FrameRecord) -> Option<f64> {
+    let sum = || Some(frame.build_ms? + frame.render_ms?);
+    frame
+        .frame_ms
+        .or_else(sum)
+        .filter(|time| time.is_finite() && *time >= 0.0)
 }
 
-/// `None` if the log does not tell, as of failures in logs of earlier versions.
-pub(super) fn time(frame: &FrameRecord) -> Option<FrameTime> {
-    let both = frame
-        .build_ms
-        .zip(frame.render_ms)
-        .map(|(build, render)| build + render);
-    let whole = frame.frame_ms.or(both).filter(|time| time.is_finite())?;
+/// The part of the frame in which a tree was built.
+pub(super) fn build_part_ms(frame: &FrameRecord) -> f64 {
+    let whole = whole_ms(frame).unwrap_or(0.0);
     let build = frame.build_ms.filter(|time| time.is_finite());
-    Some(FrameTime {
+    build.unwrap_or(0.0).clamp(0.0, whole)
+}
+
+/// The plot of all frames with its caption; a sentence if no frame left a time.
+pub(super) fn section(run: &RunRecord, compared: &[ComparisonRow]) -> String {
+    let mut html = "<h2>Frames</h2>\n".to_string();
+    let times: Vec<f64> = run.frames.iter().filter_map(whole_ms).collect();
+    if times.is_empty() {
+        return html + "<p>No frame left the time that it took.</p>\n";
+    }
+    let total: f64 = times.iter().sum();
+    html.push_str(&format!(
+        "<p>{} took {}; one took {} on average and {} at most.</p>\n",
+        number::counted(times.len(), "frame"),
+        number::seconds(total / 1e3),
+        number::milliseconds(total / times.len() as f64),
+        number::milliseconds(times.iter().copied().fold(0.0, f64::max)),
+    ));
+    let per_column = run.frames.len().div_ceil(MOST_COLUMNS);
+    let most = axis_end(&times, compared);
+    html.push_str(&figure(
+        &timeline(run, compared, per_column, most),
+        &caption(run, compared, per_column, most.is_finite()),
+    ));
+    html
+}
+
+/// Where the axis ends; infinite if it shows everything.
+fn axis_end(times: &[f64], compared: &[ComparisonRow]) -> f64 {
+    let mut sorted = times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted[(sorted.len() - 1) * 95 / 100];
+    let base = compared
+        .iter()
+        .map(|row| row.cost_ms.upper)
+        .filter(|time| time.is_finite())
+        .fold(usual, f64::max);
+    if base > 0.0 && sorted[sorted.len() - 1] > CUT_FROM * base {
+        HEADROOM * base
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Means of neighbours that share a column.
+struct Group {
+    middle: f64,
+    build: f64,
+    whole: f64,
+    kind: Kind,
+    title: String,
+}
+
+fn group(frames: &[FrameRecord]) -> Option<Group> {
+    let timed: Vec<(&FrameRecord, f64)> = frames
+        .iter()
+        .filter_map(|frame| Some((frame, whole_ms(frame)?)))
+        .collect();
+    let (&(first, _), &(last, _)) = (timed.first()?, timed.last()?);
+    let count = timed.len() as f64;
+    let whole = timed.iter().map(|(_, whole)| whole).sum::<f64>() / count;
+    let builds = timed.iter().map(|(frame, _)| build_part_ms(frame));
+    let build = builds.sum::<f64>() / count;
+    let often = |kind: Kind| {
+        let of_kind = timed.iter().filter(|(frame, _)| Kind::of(frame) == kind);
+        of_kind.count()
+    };
+    let kind = Kind::ALL.into_iter().max_by_key(|&kind| often(kind))?;
+    let times = format!(
+        "{}, of it build {}",
+        number::milliseconds(whole),
+        number::milliseconds(build)
+    );
+    let title = if first.frame == last.frame {
+        format!("whole frame {}: {times}\n{}", first.frame, kind.name())
+    } else {
+        format!("frames {} to {}: mean {times}", first.frame, last.frame)
+    };
+    Some(Group {
+        middle: 0.5 * (first.frame + last.frame) as f64,
+        build,
         whole,
-        build: build.unwrap_or(0.0).min(whole),
+        kind,
+        title,
     })
 }
 
-/// Time of every frame, what it was, the incumbent's cost and the defaults; `None` if no frame has a
-/// time.
-pub(super) fn timeline(frames: &[FrameRecord], compared: &[ComparisonRow]) -> Option<String> {
-    let together = frames.len().div_ceil(MOST_COLUMNS).max(1);
-    let groups: Vec<Group> = frames.chunks(together).filter_map(Group::of).collect();
-    let mut wholes: Vec<f64> = groups.iter().map(|group| group.whole).collect();
-    wholes.sort_by(f64::total_cmp);
-    let most = *wholes.last()?;
-    let baselines = compared.get(1..).unwrap_or_default();
-    let usual = baselines
-        .iter()
-        .map(|row| row.cost_ms.median)
-        .filter(|median| median.is_finite())
-        .fold(wholes[(wholes.len() - 1) * 3 / 4], f64::max);
-    let cut = if most > CUT * usual {
-        CUT * usual
-    } else {
-        most
-    };
-
-    let mut layers = vec![Layer::Columns {
-        name: "building trees".to_string(),
-        class: "build",
-        width: together as f64,
-        columns: groups
-            .iter()
-            .filter(|group| group.build > 0.0)
-            .map(|group| group.column(0.0, group.build))
-            .collect(),
-    }];
-    for (index, (_, name, class)) in Kind::STACKED.into_iter().enumerate() {
+fn timeline(run: &RunRecord, compared: &[ComparisonRow], per_column: usize, most: f64) -> String {
+    let groups: Vec<Group> = run.frames.chunks(per_column).filter_map(group).collect();
+    let columns = |name: &str, class, part: &dyn Fn(&Group) -> Option<Part<f64>>| {
         let columns = groups.iter().filter_map(|group| {
-            let below: f64 = group.build + group.rest[..index].iter().sum::<f64>();
-            let part = group.rest[index];
-            (part > 0.0).then(|| group.column(below, below + part))
+            let part = part(group)?;
+            Some(Column {
+                x: group.middle,
+                from: part.start,
+                to: part.end,
+                title: group.title.clone(),
+            })
         });
-        layers.push(Layer::Columns {
+        Layer::Columns {
             name: name.to_string(),
             class,
-            width: together as f64,
+            width: per_column as f64,
             columns: columns.collect(),
-        });
+        }
+    };
+    let mut layers = vec![columns("build", "kind-build", &|group| {
+        (group.build > 0.0).then_some(0.0..group.build)
+    })];
+    for kind in Kind::ALL {
+        layers.push(columns(kind.name(), kind.class(), &|group| {
+            (group.kind == kind).then_some(group.build..group.whole)
+        }));
     }
-    layers.extend(plots::levels(compared).into_iter().skip(1));
+    layers.extend(compared_levels(compared));
     layers.push(Layer::Steps {
         name: "cost of the incumbent".to_string(),
         class: "incumbent",
-        points: frames
+        points: run
+            .frames
             .iter()
             .filter_map(|frame| Some((frame.frame as f64, frame.incumbent_cost_ms?)))
             .collect(),
     });
-    let untimed = frames.iter().filter(|frame| time(frame).is_none());
-    layers.push(Layer::Absences {
-        name: "failed, time not known".to_string(),
-        places: untimed
-            .map(|frame| (frame.frame as f64, format!("frame {}", frame.frame)))
+    let incumbents = run.frames.iter().filter(|frame| frame.is_incumbent);
+    layers.push(Layer::Marks {
+        name: "new incumbent".to_string(),
+        marker: Marker::Diamond,
+        radius: 4.0,
+        marks: incumbents
+            .filter_map(|frame| {
+                Some(Mark {
+                    x: frame.frame as f64,
+                    y: frame.incumbent_cost_ms?,
+                    class: "incumbent".to_string(),
+                    title: format!("new incumbent in frame {}", frame.frame),
+                })
+            })
             .collect(),
     });
-    let plot = Plot {
-        size: WIDE,
-        description: "Time of every frame",
+    let untimed = run.frames.iter().filter(|frame| whole_ms(frame).is_none());
+    layers.push(Layer::Absences {
+        name: "no time".to_string(),
+        places: untimed
+            .step_by(per_column)
+            .map(|frame| {
+                let title = format!("whole frame {} left no time", frame.frame);
+                (frame.frame as f64, title)
+            })
+            .collect(),
+    });
+    Plot {
+        size: SIZE,
+        description: "Time of every whole frame",
         x_label: "frame",
-        y_label: "time of the frame (ms)",
-        y_range: Range::FromZero(cut),
+        y_label: "time (ms)",
+        y_range: Range::FromZero(most),
         layers,
-    };
-    Some(plot.draw())
+    }
+    .draw()
 }
 
-/// Explains what is in the timeline and nothing that is not.
-pub(super) fn caption(frames: &[FrameRecord], compared: &[ComparisonRow]) -> String {
-    let together = frames.len().div_ceil(MOST_COLUMNS);
-    let mut caption = if together > 1 {
-        format!("Each column is the mean of {together} frames")
+fn caption(run: &RunRecord, compared: &[ComparisonRow], per_column: usize, is_cut: bool) -> String {
+    let mut caption = if per_column == 1 {
+        "Each column is one frame from its beginning to its end, its lower part the building of a \
+         tree"
+            .to_string()
     } else {
-        "Each column is one frame".to_string()
+        format!(
+            "Each column is the mean of {per_column} frames, its lower part the building of trees; \
+             its colour is what most of them were used for"
+        )
     };
-    caption.push_str(", build and everything, with the building of trees at its foot");
-    if compared.len() > 1 {
+    if is_cut {
+        caption.push_str("; columns that reach beyond the plot bear a triangle");
+    }
+    if !compared.is_empty() {
         caption.push_str(
-            "; horizontal lines are frames with the defaults, measured at the end, with their \
-             quartiles as bands",
+            "; horizontal lines are the costs of the compared configurations, measured at the end",
         );
     }
-    caption.push_str(
-        "; the stepped line is what a frame with the incumbent costs by the metric. A column that \
-         ends in a triangle is longer than is shown.",
-    );
+    caption.push('.');
+    if run.header.metric == "render" {
+        caption.push_str(
+            " Costs are times to render, without a build: with one tree for all frames there is \
+             none.",
+        );
+    }
     caption
-}
-
-/// Frames that share a column, as means over them.
-struct Group {
-    first: usize,
-    last: usize,
-    whole: f64,
-    build: f64,
-    /// What is not build, by kind.
-    rest: [f64; Kind::STACKED.len()],
-    title: String,
-}
-
-impl Group {
-    fn of(frames: &[FrameRecord]) -> Option<Group> {
-        let timed: Vec<(&FrameRecord, FrameTime)> = frames
-            .iter()
-            .filter_map(|frame| Some((frame, time(frame)?)))
-            .collect();
-        let (first, last) = (timed.first()?.0, timed.last()?.0);
-        let share = 1.0 / timed.len() as f64;
-        let mut group = Group {
-            first: first.frame,
-            last: last.frame,
-            whole: 0.0,
-            build: 0.0,
-            rest: [0.0; Kind::STACKED.len()],
-            title: String::new(),
-        };
-        for (frame, time) in &timed {
-            let kind = kind(frame);
-            group.whole += share * time.whole;
-            group.build += share * time.build;
-            for (rest, (stacked, ..)) in group.rest.iter_mut().zip(Kind::STACKED) {
-                if stacked == kind {
-                    *rest += share * (time.whole - time.build);
-                }
-            }
-        }
-        let frames = match timed.len() {
-            1 => format!("frame {}", group.first),
-            _ => format!("frames {} to {}, mean", group.first, group.last),
-        };
-        group.title = format!(
-            "{frames}: {}, of which building {}",
-            number::milliseconds(group.whole),
-            number::milliseconds(group.build)
-        );
-        if let (1, Some(reason)) = (timed.len(), &first.reason) {
-            group.title.push_str(&format!("\n{reason}"));
-        }
-        Some(group)
-    }
-
-    fn column(&self, from: f64, to: f64) -> Column {
-        Column {
-            x: 0.5 * (self.first + self.last) as f64,
-            from,
-            to,
-            title: self.title.clone(),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -242,59 +293,68 @@ mod tests {
     use crate::report::example;
 
     #[test]
-    fn the_kinds_of_frames_are_told_apart() {
+    fn the_time_of_a_frame_is_the_recorded_one_or_the_sum() {
         let mut frame = example::frame(0);
-        assert_eq!(kind(&frame), Kind::Trial);
-        frame.frame_ms = Some(50.0);
-        assert_eq!(kind(&frame), Kind::Alone);
-        frame.cost_ms = None;
-        assert_eq!(kind(&frame), Kind::Alone, "an incumbent need not be told");
-        frame.reason = Some("start".to_string());
-        assert_eq!(kind(&frame), Kind::Failed);
-        frame.cost_ms = Some(40.0);
-        assert_eq!(kind(&frame), Kind::Trial);
-        frame.probe = Some(example::probe(0.9, "accepted"));
-        assert_eq!(kind(&frame), Kind::Probe);
-        frame.failure = Some("too deep".to_string());
-        assert_eq!(kind(&frame), Kind::Failed);
+        (frame.build_ms, frame.render_ms) = (Some(2.0), Some(3.0));
+        assert_eq!(whole_ms(&frame), Some(5.0));
+        frame.frame_ms = Some(4.0);
+        assert_eq!(whole_ms(&frame), Some(4.0));
+        assert_eq!(build_part_ms(&frame), 2.0);
+        // A build in the background may take longer than the frame.
+        frame.build_ms = Some(9.0);
+        assert_eq!(build_part_ms(&frame), 4.0);
+        for none in [f64::NAN, f64::INFINITY, -1.0] {
+            frame.frame_ms = Some(none);
+            assert_eq!(whole_ms(&frame), None);
+        }
+        (frame.frame_ms, frame.build_ms) = (None, None);
+        assert_eq!(whole_ms(&frame), None);
     }
 
     #[test]
-    fn a_frame_without_its_own_time_took_build_and_render() {
-        let mut frame = example::frame(0);
-        (frame.build_ms, frame.render_ms) = (Some(5.0), Some(30.0));
-        let old = time(&frame).unwrap();
-        assert_eq!((old.whole, old.build), (35.0, 5.0));
-        frame.frame_ms = Some(33.0);
-        assert_eq!(time(&frame).unwrap().whole, 33.0);
-        frame.build_ms = Some(99.0);
-        assert_eq!(time(&frame).unwrap().build, 33.0);
-        (frame.frame_ms, frame.render_ms) = (None, None);
-        assert_eq!(time(&frame), None);
+    fn frames_are_told_apart_by_their_use() {
+        let frames = example::probed(60).frames;
+        for kind in [
+            Kind::Incumbent,
+            Kind::Probe,
+            Kind::AcceptedProbe,
+            Kind::Failed,
+        ] {
+            let found = frames.iter().any(|frame| Kind::of(frame) == kind);
+            assert!(found, "{kind:?}");
+        }
+        assert_eq!(Kind::of(&example::frame(0)), Kind::Trial);
+        assert_eq!(Kind::of(&example::frame(11)), Kind::Failed);
     }
 
     #[test]
-    fn a_column_is_as_high_as_its_parts() {
-        let frames = example::probed(30).frames;
-        let group = Group::of(&frames).unwrap();
-        let parts = group.build + group.rest.iter().sum::<f64>();
-        assert!((parts - group.whole).abs() < 1e-9 * group.whole);
-        assert!(group.title.starts_with("frames 0 to 29, mean"));
+    fn every_frame_has_a_column_until_there_are_too_many() {
+        let run = example::run(40);
+        let html = section(&run, &[]);
+        let timed = run.frames.iter().filter(|frame| whole_ms(frame).is_some());
+        for frame in timed {
+            assert!(html.contains(&format!("whole frame {}: ", frame.frame)));
+        }
+        let html = section(&example::run(4001), &[]);
+        assert!(html.contains("mean of 11 frames"));
+        assert!(html.matches("<rect").count() <= 2 * MOST_COLUMNS + 10);
     }
 
     #[test]
-    fn many_frames_share_columns() {
-        let run = example::probed(5_000);
-        let compared = run.summary.unwrap().comparison;
-        let drawn = timeline(&run.frames, &compared).unwrap();
-        let columns = drawn.matches("class=\"fill build\"").count();
-        assert!((100..=MOST_COLUMNS + 1).contains(&columns), "{columns}");
-        assert!(caption(&run.frames, &compared).contains("mean of 13 frames"));
+    fn one_slow_frame_does_not_flatten_the_others() {
+        let mut run = example::run(40);
+        assert!(!section(&run, &[]).contains("triangle"));
+        run.frames[3].frame_ms = Some(1e5);
+        assert!(section(&run, &[]).contains("bear a triangle"));
     }
 
     #[test]
-    fn no_times_are_no_plot() {
-        assert_eq!(timeline(&[], &[]), None);
-        assert_eq!(timeline(&[example::frame(11)], &[]), None);
+    fn without_times_there_is_a_sentence() {
+        let mut run = example::run(3);
+        for frame in &mut run.frames {
+            frame.render_ms = None;
+        }
+        let html = section(&run, &[]);
+        assert!(html.contains("No frame left") && !html.contains("<svg"));
     }
 }

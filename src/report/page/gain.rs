@@ -1,180 +1,213 @@
-//! What tuning gained or lost in seconds, frame by frame, against never having tuned.
+//! What the run gained or lost so far, against each baseline: trials cost time before they pay.
 //!
-//! The reference is a default that was compared at the end: each frame is taken to have cost its
-//! median, its tree included as the metric has it, and where the tree serves all frames it is built
-//! once, in the first. The account of a frame is what the default would have taken less what the
-//! frame took; the sum over the frames is what is shown. It is paid back from the first frame on after
-//! which the sum is never again below zero. Not good for runs during which the machine changed its
-//! speed: the reference is of the end.
+//! The reference of a frame is the median cost of the baseline in the comparison at the end; a
+//! baseline whose cost has no build is charged one, before the first frame. Frames without a time
+//! are in neither sum. Break-even is the frame after which the run stays ahead.
 
+use super::verdict::{Outcome, comparison, outcome};
+use super::{figure, frames::whole_ms};
+use crate::report::markup::escape;
 use crate::report::number;
-use crate::report::record::{ComparisonRow, RunRecord};
+use crate::report::record::{ComparisonRow, FrameRecord, RunRecord};
+use crate::report::svg::Size;
 use crate::report::svg::marker::Marker;
 use crate::report::svg::xy::{Layer, Mark, Plot, Range};
 
-use super::frames;
-use super::plots::{self, WIDE};
-use super::verdict::{self, Outcome};
+const SIZE: Size = Size {
+    width: 860.0,
+    height: 320.0,
+};
+/// The classes of the baselines: those which they have in the comparison, behind the tuned row.
+const CLASSES: [&str; 3] = ["s1", "s2", "s3"];
 
-/// Frames against one default.
-#[derive(Debug)]
-pub(super) struct Account<'a> {
-    row: &'a ComparisonRow,
-    outcome: Outcome,
-    /// Frame, and seconds gained up to its end.
-    points: Vec<(f64, f64)>,
-    /// The index in `points` from which on nothing is owed; `None` if something is at the end.
-    break_even: Option<usize>,
-    /// What a frame with the tuned configuration takes less, in seconds, by the fresh comparison.
-    gain_per_frame: f64,
+/// Gain over the frames of a run.
+#[derive(Clone, Debug, PartialEq)]
+struct Gain {
+    /// Frames done, and seconds gained until then.
+    sums: Vec<(f64, f64)>,
+    standing: Standing,
 }
 
-/// One for each default whose times are known; none if no frame has a time.
-pub(super) fn accounts(run: &RunRecord) -> Vec<Account<'_>> {
-    let Some((tuned, baselines)) = verdict::comparison(run) else {
-        return Vec::new();
-    };
-    let is_built_once = run.header.metric == "render";
-    let mut accounts = Vec::new();
-    for row in baselines {
-        let first = if is_built_once { row.build_ms.median } else { 0.0 };
-        let mut sum = -0.0;
-        let mut points = Vec::new();
-        for frame in &run.frames {
-            if let Some(time) = frames::time(frame) {
-                if points.is_empty() {
-                    sum += first;
-                }
-                sum += row.cost_ms.median - time.whole;
-                points.push((frame.frame as f64, sum / 1e3));
-            }
-        }
-        if points.is_empty() || !points.iter().all(|point| point.1.is_finite()) {
+/// Where a run stands against a baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Standing {
+    /// Ahead in the end, and since so many frames were done.
+    Ahead { since: usize },
+    /// Behind in the end.
+    Behind,
+}
+
+fn gain(frames: &[FrameRecord], reference_ms: f64, first_build_ms: f64) -> Gain {
+    let mut sum = first_build_ms / 1e3;
+    let mut sums = Vec::new();
+    let mut since = 1;
+    for (index, frame) in frames.iter().enumerate() {
+        let Some(whole) = whole_ms(frame) else {
             continue;
+        };
+        sum += (reference_ms - whole) / 1e3;
+        let done = index + 1;
+        sums.push((done as f64, sum));
+        if sum < 0.0 {
+            since = done + 1;
         }
-        let owed = points.iter().rposition(|point| point.1 < 0.0);
-        let break_even = owed.map_or(0, |last| last + 1);
-        accounts.push(Account {
-            row,
-            outcome: verdict::outcome(tuned, row),
-            break_even: (break_even < points.len()).then_some(break_even),
-            points,
-            gain_per_frame: (row.cost_ratio_to_tuned.median - 1.0) * tuned.cost_ms.median / 1e3,
-        });
     }
-    accounts
+    let standing = if sum < 0.0 {
+        Standing::Behind
+    } else {
+        Standing::Ahead { since }
+    };
+    Gain { sums, standing }
 }
 
-/// The accounts over the frames; break-even is a diamond.
-pub(super) fn plot(accounts: &[Account<'_>]) -> String {
+/// The gains against `row`; `None` if its cost is no number or no frame left a time.
+fn gain_against(run: &RunRecord, row: &ComparisonRow) -> Option<Gain> {
+    let first_build = match run.header.metric.as_str() {
+        "render" => row.build_ms.median,
+        _ => 0.0,
+    };
+    let gain = gain(&run.frames, row.cost_ms.median, first_build);
+    let known = gain.sums.last()?.1.is_finite();
+    known.then_some(gain)
+}
+
+/// Plot and sentences; a sentence alone if there is nothing to compare.
+pub(super) fn section(run: &RunRecord) -> String {
+    let mut html = "<h2>Gain or loss so far</h2>\n".to_string();
+    let Some((tuned, baselines)) = comparison(run).filter(|(_, rows)| !rows.is_empty()) else {
+        return html
+            + "<p>Without a comparison there is no reference: what the search cost or gained in \
+               seconds is not known.</p>\n";
+    };
+    let gains: Vec<(usize, &ComparisonRow, Gain)> = baselines
+        .iter()
+        .enumerate()
+        .filter_map(|(index, row)| Some((index, row, gain_against(run, row)?)))
+        .collect();
+    if gains.is_empty() {
+        return html
+            + "<p>No frame left the time that it took, or the baselines left none: nothing can be \
+               added up.</p>\n";
+    }
+    for (_, row, gain) in &gains {
+        let sentence = sentence(tuned, row, gain);
+        html.push_str(&format!("<p>{}</p>\n", escape(&sentence)));
+    }
+    let untimed = run.frames.iter().filter(|frame| whole_ms(frame).is_none());
+    let remark = match untimed.count() {
+        0 => String::new(),
+        count => format!(
+            " {} left no time and {} missing: the true loss is greater by what they took.",
+            number::counted(count, "frame"),
+            if count == 1 { "is" } else { "are" }
+        ),
+    };
+    html.push_str(&figure(
+        &plot(&gains),
+        &format!(
+            "Time that the same number of frames would have taken with the baseline, less the time \
+             that the run took, builds and failures included: above zero the run is ahead. \
+             Diamonds mark break-even, after which it stays ahead.{remark}"
+        ),
+    ));
+    html
+}
+
+/// The standing against a baseline in words.
+fn sentence(tuned: &ComparisonRow, row: &ComparisonRow, gain: &Gain) -> String {
+    let Some(&(done, sum)) = gain.sums.last() else {
+        return String::new();
+    };
+    let name = &row.name;
+    let frames = number::counted(done as usize, "frame");
+    match gain.standing {
+        Standing::Ahead { since } => {
+            let when = if since <= 1 {
+                "ahead from the first frame on".to_string()
+            } else {
+                format!("break-even after {} frames", number::count(since))
+            };
+            format!(
+                "Against {name}: {} gained in {frames}; {when}.",
+                number::seconds(sum)
+            )
+        }
+        Standing::Behind => format!(
+            "Against {name}: {} lost in {frames}; break-even {}.",
+            number::seconds(-sum),
+            not_yet(tuned, row, -sum)
+        ),
+    }
+}
+
+/// When a loss of `behind` seconds will be made up, if ever.
+fn not_yet(tuned: &ComparisonRow, row: &ComparisonRow, behind: f64) -> String {
+    match outcome(tuned, row) {
+        Outcome::Faster => {
+            let ratio = row.cost_ratio_to_tuned;
+            let gain = |ratio: f64| tuned.cost_ms.median * (ratio - 1.0) / 1e3;
+            let more = |ratio: f64| (behind / gain(ratio)).ceil();
+            let frames = more(ratio.median);
+            if !frames.is_finite() || frames > 1e9 {
+                return "not yet, nor at any time that could be told".into();
+            }
+            format!(
+                "not yet: after about {} more frames at today's gain of {} per frame, if nothing \
+                 more is tried ({} to {} by the quartiles)",
+                number::count(frames as usize),
+                number::milliseconds(1e3 * gain(ratio.median)),
+                number::brief(more(ratio.upper), 3),
+                number::brief(more(ratio.lower), 3),
+            )
+        }
+        Outcome::Slower => "not at today's costs, since the tuned configuration is slower".into(),
+        Outcome::Undecided => {
+            "not yet, and not to be foretold, since no difference is clear today".into()
+        }
+        Outcome::Same => "is out of reach, since the search found the baseline again".into(),
+        Outcome::Unknown => "is not known, since no ratio could be formed".into(),
+    }
+}
+
+fn plot(gains: &[(usize, &ComparisonRow, Gain)]) -> String {
     let mut layers = vec![Layer::Level {
         name: String::new(),
-        class: "plain".to_string(),
+        class: "incumbent".to_string(),
         y: 0.0,
         band: (0.0, 0.0),
     }];
-    for (index, account) in accounts.iter().enumerate() {
+    for (index, row, gain) in gains {
+        let class = CLASSES[index % CLASSES.len()];
         layers.push(Layer::Line {
-            name: format!("against {}", account.row.name),
-            class: plots::line_class(index + 1),
-            points: account.points.clone(),
+            name: format!("against {}", row.name),
+            class,
+            points: gain.sums.clone(),
         });
+        if let Standing::Ahead { since } = gain.standing
+            && let Some(&(x, y)) = gain.sums.iter().find(|(done, _)| *done >= since as f64)
+        {
+            layers.push(Layer::Marks {
+                name: String::new(),
+                marker: Marker::Diamond,
+                radius: 6.0,
+                marks: vec![Mark {
+                    x,
+                    y,
+                    class: format!("compared {class}"),
+                    title: format!("ahead of {} after {x} frames", row.name),
+                }],
+            });
+        }
     }
-    let marks = accounts.iter().enumerate().filter_map(|(index, account)| {
-        let (x, y) = account.points[account.break_even?];
-        Some(Mark {
-            x,
-            y,
-            class: format!("compared {}", plots::series(index + 1)),
-            title: sentence(account),
-        })
-    });
-    layers.push(Layer::Marks {
-        name: "break-even".to_string(),
-        marker: Marker::Diamond,
-        radius: 6.0,
-        marks: marks.collect(),
-    });
     Plot {
-        size: WIDE,
-        description: "Accumulated gain or loss against the defaults",
-        x_label: "frame",
-        y_label: "accumulated gain (s)",
+        size: SIZE,
+        description: "Seconds gained or lost over the frames",
+        x_label: "frames done",
+        y_label: "gain (s)",
         y_range: Range::Fitted,
         layers,
     }
     .draw()
-}
-
-/// Explains the plot; `untimed` frames are left out of it.
-pub(super) fn caption(run: &RunRecord, untimed: usize) -> String {
-    let mut caption = "What all frames up to each one took less than with a default: above the line \
-                       at zero the run is ahead. The default is taken to cost its median of the \
-                       comparison in every frame"
-        .to_string();
-    caption.push_str(if run.header.metric == "render" {
-        ", and its tree to be built once."
-    } else {
-        ", with the share of the build that the metric has."
-    });
-    if untimed > 0 {
-        caption.push_str(&format!(
-            " The log does not tell how long {} frames took that failed: they are left out, and \
-             the account is too good by them.",
-            number::count(untimed)
-        ));
-    }
-    caption
-}
-
-/// The account in words.
-pub(super) fn sentence(account: &Account<'_>) -> String {
-    let frames = number::count(account.points.len());
-    let Some(&(_, end)) = account.points.last() else {
-        return String::new();
-    };
-    let size = seconds(end.abs());
-    let state = match account.break_even {
-        Some(0) => format!("never behind, and {size} ahead after {frames} frames"),
-        Some(index) => format!(
-            "paid back from frame {} on, and {size} ahead after {frames} frames",
-            account.points[index].0
-        ),
-        None => format!("not yet paid back: {size} behind after {frames} frames"),
-    };
-    let per_frame = number::milliseconds(account.gain_per_frame.abs() * 1e3);
-    let outlook = match (account.outcome, account.break_even) {
-        (Outcome::Faster, None) => {
-            let more = (-end / account.gain_per_frame).ceil();
-            if more.is_finite() && more < 1e9 {
-                format!(
-                    "; after about {} more frames with the tuned configuration at today's gain of \
-                     {per_frame} a frame",
-                    number::count(more.max(1.0) as usize)
-                )
-            } else {
-                "; today's gain is too small for it ever to be".to_string()
-            }
-        }
-        (Outcome::Faster, Some(_)) => format!("; today's gain is {per_frame} a frame"),
-        (Outcome::Same, None) => {
-            "; nor will it be, since the search came back to this default".to_string()
-        }
-        (Outcome::Slower, _) => format!("; today {per_frame} a frame are lost"),
-        (Outcome::Undecided | Outcome::Unknown, None) => {
-            "; when it will be cannot be said, as there is no clear gain today".to_string()
-        }
-        _ => String::new(),
-    };
-    format!("Against {}: {state}{outlook}.", account.row.name)
-}
-
-fn seconds(value: f64) -> String {
-    if value < 1.0 {
-        number::milliseconds(value * 1e3)
-    } else {
-        format!("{} s", number::significant(value, 3))
-    }
 }
 
 #[cfg(test)]
@@ -182,83 +215,85 @@ mod tests {
     use super::*;
     use crate::report::example;
 
-    /// A run by the total metric whose frames took `times`, against a default of 10 ms with `ratio`.
-    fn run(times: &[f64], ratio: f64) -> RunRecord {
-        let mut run = example::run(times.len());
+    /// Frames that take these times.
+    fn frames(times: &[f64]) -> Vec<FrameRecord> {
+        let frame = |(index, &time)| FrameRecord {
+            frame_ms: Some(time),
+            ..example::frame(index)
+        };
+        times.iter().enumerate().map(frame).collect()
+    }
+
+    #[test]
+    fn sums_and_break_even_of_a_known_run() {
+        let found = gain(&frames(&[30.0, 10.0, 5.0, 5.0, 5.0]), 10.0, 0.0);
+        let sums: Vec<f64> = found.sums.iter().map(|sum| (sum.1 * 1e3).round()).collect();
+        assert_eq!(sums, [-20.0, -20.0, -15.0, -10.0, -5.0]);
+        assert_eq!(found.standing, Standing::Behind);
+        let found = gain(&frames(&[12.0, 9.0, 5.0, 30.0, 0.0, 0.0]), 10.0, 0.0);
+        // Ahead after the third frame, but not for long.
+        assert_eq!(found.standing, Standing::Ahead { since: 6 });
+        let found = gain(&frames(&[12.0, 9.0]), 10.0, 2.0);
+        assert_eq!(found.standing, Standing::Ahead { since: 1 });
+    }
+
+    #[test]
+    fn a_frame_without_time_is_in_neither_sum() {
+        let mut some = frames(&[20.0, 0.0, 5.0]);
+        (some[1].frame_ms, some[1].build_ms) = (None, None);
+        let found = gain(&some, 10.0, 0.0);
+        assert_eq!(found.sums.len(), 2);
+        assert!((found.sums[1].1 + 0.005).abs() < 1e-12);
+    }
+
+    fn run_with(times: &[f64], ratio: f64) -> RunRecord {
+        let mut run = example::run(0);
+        run.frames = frames(times);
         run.header.metric = "total".to_string();
-        for (frame, &time) in run.frames.iter_mut().zip(times) {
-            frame.frame_ms = Some(time);
-        }
         let comparison = &mut run.summary.as_mut().unwrap().comparison;
         comparison.truncate(1);
-        comparison[0].cost_ms = example::spread(10.0 / ratio, 0.01);
-        comparison.push(example::row("base", "1", 10.0, ratio));
+        comparison[0].cost_ms = example::spread(10.0, 0.0);
+        let mut weak = example::row("weak", "1", 10.0 * ratio, ratio);
+        // Example rows differ from the tuned one by their quality only.
+        weak.config[0].1 = "another".to_string();
+        comparison.push(weak);
         run
     }
 
-    fn told(run: &RunRecord) -> String {
-        sentence(&accounts(run)[0])
+    #[test]
+    fn break_even_is_told_or_foretold() {
+        // The baseline takes 20 ms: 30 ms are lost in the first frame, 10 gained in each other.
+        let html = section(&run_with(&[50.0, 10.0, 10.0, 10.0, 10.0], 2.0));
+        assert!(html.contains("break-even after 4 frames."), "{html}");
+        assert!(html.contains("<title>ahead of weak after 4 frames"));
+        let html = section(&run_with(&[50.0, 10.0], 2.0));
+        assert!(html.contains("20.0 ms lost in 2 frames"), "{html}");
+        let told = "not yet: after about 2 more frames at today&#39;s gain of 10.0 ms";
+        assert!(html.contains(told), "{html}");
+        let html = section(&run_with(&[50.0], 0.9));
+        assert!(html.contains("not at today&#39;s costs"), "{html}");
+        let html = section(&run_with(&[50.0], 1.001));
+        assert!(html.contains("not to be foretold"), "{html}");
     }
 
     #[test]
-    fn the_account_is_the_sum_of_the_differences() {
-        let run = run(&[14.0, 12.0, 6.0, 5.0, 5.0], 2.0);
-        let account = &accounts(&run)[0];
-        let gained: Vec<f64> = account.points.iter().map(|point| point.1 * 1e3).collect();
-        for (gained, expected) in gained.iter().zip([-4.0, -6.0, -2.0, 3.0, 8.0]) {
-            assert!((gained - expected).abs() < 1e-9, "{gained} {expected}");
-        }
-        assert_eq!(account.break_even, Some(3));
-        assert_eq!(
-            sentence(account),
-            "Against base: paid back from frame 3 on, and 8.00 ms ahead after 5 frames; \
-             today's gain is 5.00 ms a frame."
-        );
-    }
-
-    #[test]
-    fn a_second_loss_moves_break_even() {
-        let run = run(&[14.0, 1.0, 18.0, 5.0], 2.0);
-        assert_eq!(accounts(&run)[0].break_even, Some(3));
-    }
-
-    #[test]
-    fn what_is_not_paid_back_has_an_outlook() {
-        let more = told(&run(&[20.0, 11.0, 10.0], 2.0));
-        assert!(more.contains("11.0 ms behind after 3 frames"), "{more}");
-        assert!(more.contains("after about 3 more frames"), "{more}");
-        let unclear = told(&run(&[20.0], 1.0));
-        assert!(unclear.contains("no clear gain"), "{unclear}");
-        let worse = told(&run(&[20.0], 0.5));
-        assert!(worse.contains("today 10.0 ms a frame are lost"), "{worse}");
-        let mut same = run(&[20.0], 1.0);
-        let comparison = &mut same.summary.as_mut().unwrap().comparison;
-        comparison[1].config = comparison[0].config.clone();
-        assert!(told(&same).contains("came back to this default"));
-        let never = told(&run(&[5.0, 5.0], 2.0));
-        assert!(never.contains("never behind, and 10.0 ms ahead"), "{never}");
-    }
-
-    #[test]
-    fn a_tree_that_serves_all_frames_is_built_once() {
-        let mut run = run(&[10.0, 10.0], 1.0);
+    fn a_tree_for_all_frames_has_to_be_built_once_with_the_baseline_too() {
+        let mut run = run_with(&[21.0], 2.0);
+        assert!(section(&run).contains("1.00 ms lost"));
         run.header.metric = "render".to_string();
-        let build = run.summary.as_ref().unwrap().comparison[1].build_ms.median;
-        let account = &accounts(&run)[0];
-        assert!((account.points[0].1 * 1e3 - build).abs() < 1e-9);
-        assert!((account.points[1].1 * 1e3 - build).abs() < 1e-9);
+        // 24 ms of build.
+        let html = section(&run);
+        assert!(html.contains("23.0 ms gained"), "{html}");
     }
 
     #[test]
-    fn nothing_is_claimed_without_times_or_a_comparison() {
-        let mut run = run(&[10.0], 1.0);
-        run.frames[0].frame_ms = Some(f64::NAN);
-        run.frames[0].render_ms = None;
-        assert!(accounts(&run).is_empty());
-        run.frames[0].frame_ms = Some(10.0);
-        run.summary.as_mut().unwrap().comparison[1].cost_ms.median = f64::INFINITY;
-        assert!(accounts(&run).is_empty());
+    fn what_is_missing_is_said() {
+        let mut run = example::run(20);
+        assert!(section(&run).contains("1 frame left no time and is missing"));
         run.summary = None;
-        assert!(accounts(&run).is_empty());
+        let html = section(&run);
+        assert!(html.contains("no reference") && !html.contains("<svg"));
+        assert!(!section(&example::run(0)).contains("<svg"));
+        assert!(!section(&run_with(&[1.0], f64::NAN)).contains("<svg"));
     }
 }

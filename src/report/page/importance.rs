@@ -105,7 +105,11 @@ fn plot(effects: &[Effect]) -> String {
                 lower: f64::NAN,
                 upper: f64::NAN,
             },
-            label: format!("{:.0} %", 100.0 * effect.share),
+            label: format!(
+                "{:.0} % ({:.0} % by chance)",
+                100.0 * effect.share,
+                100.0 * effect.by_chance
+            ),
         })
         .collect();
     bars(

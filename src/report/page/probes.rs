@@ -1,169 +1,252 @@
-//! Probes: candidates that were compared with the incumbent on some tiles of a frame.
+//! Probes: how candidates did on some tiles beside the incumbent, what was decided, what it cost.
 //!
-//! The plot has the ratio of every probe with its bounds and what was decided; the sentences say how
-//! many were turned down, and what trying them took. A frame with ratio ρ and share s of the
-//! candidate's tiles took 1 − s + s ρ times what it takes with the incumbent: the difference, and
-//! the builds, are what probes cost.
+//! A frame of which the share s was rendered with a candidate that takes r times as long as the
+//! incumbent took R (1 − s + s r), R being a frame with the incumbent alone. So R is known without
+//! having been measured, and with it what the probe cost: the build, and s (r − 1) R.
 
+use super::frames::{build_part_ms, whole_ms};
+use super::table::{Cell, Table};
+use super::{ABSENT, figure};
+use crate::report::markup::escape;
 use crate::report::number;
-use crate::report::record::{FrameRecord, ProbeRecord};
+use crate::report::record::{FrameRecord, ProbeRecord, RunRecord};
+use crate::report::svg::Size;
 use crate::report::svg::marker::Marker;
 use crate::report::svg::xy::{Interval, Layer, Plot, Range};
 
-use super::frames;
-use super::plots::{self, WIDE};
+const SIZE: Size = Size {
+    width: 860.0,
+    height: 360.0,
+};
+/// Bounds this far beyond all ratios are taken as none: the axis is for the ratios.
+const FAR: f64 = 3.0;
+/// Probes that are drawn; of more every second, third, …
+const MOST_DRAWN: usize = 600;
 
-/// More intervals than this cannot be told apart.
-const MOST_SHOWN: usize = 800;
-
-/// What can be decided, how it is drawn.
-const DECISIONS: [(&str, &str, Marker); 4] = [
-    ("rejected", "s1", Marker::Triangle),
-    ("undecided", "plain", Marker::Circle),
-    ("given up", "s3", Marker::Square),
-    ("accepted", "s2", Marker::Diamond),
+/// Decisions with their looks, in the order in which they are listed.
+const DECISIONS: [(&str, &str, Marker); 5] = [
+    ("accepted", "kind-accepted", Marker::Diamond),
+    ("rejected", "kind-probe", Marker::Circle),
+    ("undecided", "plain", Marker::Square),
+    ("given up", "open", Marker::Triangle),
+    ("failed", "bad", Marker::Cross),
 ];
 
-/// The probes of a run with their frames.
-pub(super) fn probes(frames: &[FrameRecord]) -> Vec<(&FrameRecord, &ProbeRecord)> {
-    frames
-        .iter()
-        .filter_map(|frame| Some((frame, frame.probe.as_ref()?)))
-        .collect()
+/// A frame with its probe.
+type Probed<'a> = (&'a FrameRecord, &'a ProbeRecord);
+
+/// What a probe cost beyond a frame with the incumbent, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Cost {
+    build: f64,
+    /// Less than nothing if the candidate was faster.
+    tiles: f64,
 }
 
-/// Ratios with bounds over the frames; `None` if no probe has a ratio.
-pub(super) fn plot(probes: &[(&FrameRecord, &ProbeRecord)]) -> Option<String> {
-    let with_ratio: Vec<_> = probes
+/// `None` if the frame left no time or no ratio.
+fn cost(&(frame, probe): &Probed<'_>) -> Option<Cost> {
+    let build = build_part_ms(frame);
+    let render = whole_ms(frame)? - build;
+    let excess = probe.share * (probe.ratio - 1.0);
+    let tiles = render * excess / (1.0 + excess);
+    tiles.is_finite().then_some(Cost {
+        build: build / 1e3,
+        tiles: tiles / 1e3,
+    })
+}
+
+/// Plot, table and sentences; a sentence alone if nothing was probed.
+pub(super) fn section(run: &RunRecord) -> String {
+    let html = "<h2>Probes</h2>\n".to_string();
+    let probes: Vec<Probed<'_>> = run
+        .frames
         .iter()
-        .filter(|(_, probe)| probe.ratio.is_finite() && probe.ratio > 0.0)
+        .filter_map(|frame| Some((frame, frame.probe.as_ref()?)))
         .collect();
-    if with_ratio.is_empty() {
-        return None;
+    if probes.is_empty() {
+        return html
+            + "<p>No candidate was probed on a part of a frame: what was tried was tried with \
+               whole frames.</p>\n";
     }
+    let mut html = html + &format!("<p>{}</p>\n", escape(&summary(run, &probes)));
+    html.push_str(&table(&probes).html());
+    let stride = probes.len().div_ceil(MOST_DRAWN);
+    let drawn: Vec<_> = probes.iter().copied().step_by(stride).collect();
+    if drawn.iter().any(|(_, probe)| is_ratio(probe.ratio)) {
+        let thinned = match stride {
+            1 => String::new(),
+            _ => format!(" One of {stride} probes is drawn."),
+        };
+        html.push_str(&figure(
+            &plot(&drawn),
+            &format!(
+                "Each mark is the time of a candidate over that of the incumbent on the same part \
+                 of the picture: below 1 it renders faster. Lines are one-sided bounds of 95 %; \
+                 dotted ones have no bound on a side where they reach the edge. A candidate that \
+                 renders faster may be rejected for its build.{thinned}"
+            ),
+        ));
+    } else {
+        html.push_str("<p>No probe has a ratio.</p>\n");
+    }
+    html
+}
+
+fn is_ratio(ratio: f64) -> bool {
+    ratio.is_finite() && ratio > 0.0
+}
+
+fn summary(run: &RunRecord, probes: &[Probed<'_>]) -> String {
+    let rejected = probes
+        .iter()
+        .filter(|(_, probe)| probe.decision == "rejected");
+    let share = 100.0 * rejected.count() as f64 / probes.len() as f64;
+    let costs: Vec<Cost> = probes.iter().filter_map(cost).collect();
+    let mut text = format!(
+        "{} of {} had a probe; {} % of the probes were rejected. ",
+        number::count(probes.len()),
+        number::counted(run.frames.len(), "frame"),
+        number::significant(share, 2)
+    );
+    if costs.is_empty() {
+        return text + "What they cost is not known.";
+    }
+    let build: f64 = costs.iter().map(|cost| cost.build).sum();
+    let tiles: f64 = costs.iter().map(|cost| cost.tiles).sum();
+    let all: f64 = run.frames.iter().filter_map(whole_ms).sum::<f64>() / 1e3;
+    text.push_str(&format!(
+        "Beyond the same frames with the incumbent alone they cost {} to build candidates, and \
+         their tiles {} {}: together {} % of the {} of all frames.",
+        number::seconds(build),
+        number::seconds(tiles.abs()),
+        if tiles < 0.0 { "less" } else { "more" },
+        number::significant(100.0 * (build + tiles) / all, 2),
+        number::seconds(all)
+    ));
+    match probes.len() - costs.len() {
+        0 => text,
+        unknown => text + &format!(" Of {unknown} the cost is not known."),
+    }
+}
+
+/// The decision as listed; what is not known by name is listed last.
+fn place(decision: &str) -> usize {
+    let known = DECISIONS.iter().position(|(name, ..)| *name == decision);
+    known.unwrap_or(DECISIONS.len())
+}
+
+fn table(probes: &[Probed<'_>]) -> Table {
+    let mut sorted = probes.to_vec();
+    sorted.sort_by(|(_, one), (_, other)| {
+        let by_place = place(&one.decision).cmp(&place(&other.decision));
+        by_place.then_with(|| one.decision.cmp(&other.decision))
+    });
+    let rows = sorted
+        .chunk_by(|(_, one), (_, other)| one.decision == other.decision)
+        .map(|group| row(group, probes.len()))
+        .collect();
+    Table {
+        head: [
+            "decision",
+            "probes",
+            "share of the probes (%)",
+            "median ratio",
+            "mean share of tiles (%)",
+            "builds",
+            "tiles beyond the incumbent",
+        ]
+        .map(str::to_string)
+        .to_vec(),
+        rows,
+    }
+}
+
+/// The probes of one decision.
+fn row(group: &[Probed<'_>], all: usize) -> Vec<Cell> {
+    let ratios = group.iter().map(|(_, probe)| probe.ratio);
+    let mut ratios: Vec<f64> = ratios.filter(|&ratio| is_ratio(ratio)).collect();
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios.get(ratios.len() / 2);
+    let shares = group.iter().map(|(_, probe)| probe.share).sum::<f64>();
+    let costs: Vec<Cost> = group.iter().filter_map(cost).collect();
+    let sum = |part: fn(&Cost) -> f64| {
+        let sum = || number::seconds(costs.iter().map(part).sum());
+        Cell::Number(if costs.is_empty() {
+            ABSENT.into()
+        } else {
+            sum()
+        })
+    };
+    let percent = |share: f64| Cell::Number(number::significant(100.0 * share, 3));
+    vec![
+        Cell::Text(group[0].1.decision.clone()),
+        Cell::Number(number::count(group.len())),
+        percent(group.len() as f64 / all as f64),
+        Cell::Number(median.map_or_else(|| ABSENT.into(), |&ratio| number::ratio(ratio))),
+        percent(shares / group.len() as f64),
+        sum(|cost| cost.build),
+        sum(|cost| cost.tiles),
+    ]
+}
+
+fn plot(probes: &[Probed<'_>]) -> String {
+    let ratios = || {
+        let ratios = probes.iter().map(|(_, probe)| probe.ratio);
+        ratios.filter(|&ratio| is_ratio(ratio))
+    };
+    let least = ratios().fold(1.0, f64::min) / FAR;
+    let greatest = ratios().fold(1.0, f64::max) * FAR;
+    let bound = |bound: f64| {
+        let is_near = (least..=greatest).contains(&bound);
+        if is_near { bound } else { f64::NAN }
+    };
+    let other = ("other", "plain", Marker::Circle);
     let mut layers = vec![Layer::Level {
-        name: "as fast as the incumbent".to_string(),
+        name: "as the incumbent".to_string(),
         class: "incumbent".to_string(),
         y: 1.0,
         band: (1.0, 1.0),
     }];
-    for (decision, class, marker) in DECISIONS {
-        let of_kind: Vec<_> = with_ratio
+    for (index, (name, class, marker)) in DECISIONS.into_iter().chain([other]).enumerate() {
+        let intervals = probes
             .iter()
-            .filter(|(_, probe)| decision_of(probe) == decision)
-            .collect();
+            .filter(|(_, probe)| place(&probe.decision) == index && is_ratio(probe.ratio))
+            .map(|(frame, probe)| Interval {
+                x: frame.frame as f64,
+                y: probe.ratio,
+                lower: bound(probe.lower),
+                upper: bound(probe.upper),
+                title: title(frame, probe),
+            });
         layers.push(Layer::Intervals {
-            name: decision.to_string(),
+            name: name.to_string(),
             class,
             marker,
-            intervals: plots::thinned(&of_kind, MOST_SHOWN)
-                .map(|(frame, probe)| interval(frame, probe))
-                .collect(),
+            intervals: intervals.collect(),
         });
     }
-    let plot = Plot {
-        size: WIDE,
-        description: "Ratio of every probe with its bounds",
+    Plot {
+        size: SIZE,
+        description: "Ratios of the probes with their bounds",
         x_label: "frame",
-        y_label: "render time, candidate ÷ incumbent",
+        y_label: "candidate ÷ incumbent",
         y_range: Range::Fitted,
         layers,
-    };
-    Some(plot.draw())
-}
-
-/// Explains the plot.
-pub(super) fn caption(probes: &[(&FrameRecord, &ProbeRecord)]) -> String {
-    let mut caption = "Each mark is one candidate beside the incumbent of its frame, as the mean of \
-                       pairs of tiles, with one-sided bounds at 95 %; a line that reaches the edge \
-                       has no bound there. Below 1 the candidate renders faster."
-        .to_string();
-    if probes.len() > MOST_SHOWN {
-        caption.push_str(" Of each decision only some are drawn, evenly spread over the run.");
     }
-    caption
+    .draw()
 }
 
-/// How many were turned down, and what they cost.
-pub(super) fn sentences(probes: &[(&FrameRecord, &ProbeRecord)]) -> Vec<String> {
-    let all = probes.len();
-    let mut counts: Vec<(&str, usize)> = Vec::new();
-    for (_, probe) in probes {
-        match counts.iter_mut().find(|known| known.0 == probe.decision) {
-            Some(known) => known.1 += 1,
-            None => counts.push((&probe.decision, 1)),
-        }
-    }
-    counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-    let clauses: Vec<String> = counts
-        .iter()
-        .map(|(decision, count)| {
-            let percent = 100.0 * *count as f64 / all as f64;
-            format!("{decision} {} ({percent:.0} %)", number::count(*count))
-        })
-        .collect();
-    let word = if all == 1 { "probe" } else { "probes" };
-    let mut sentences = vec![format!(
-        "{} {word}: {}.",
-        number::count(all),
-        clauses.join(", ")
-    )];
-
-    let builds: f64 = probes
-        .iter()
-        .filter_map(|(frame, _)| frame.build_ms)
-        .filter(|build| build.is_finite())
-        .sum();
-    let longer: f64 = probes
-        .iter()
-        .filter_map(|(frame, probe)| extra_ms(frame, probe))
-        .sum();
-    let mut shares: Vec<f64> = probes.iter().map(|(_, probe)| probe.share).collect();
-    shares.sort_by(f64::total_cmp);
-    let median = shares.get(shares.len() / 2).copied().unwrap_or(f64::NAN);
-    sentences.push(format!(
-        "They cost {} of building, and their tiles took {} {} than with the incumbent. The median \
-         probe had {} % of the tiles of its frame.",
-        number::milliseconds(builds),
-        number::milliseconds(longer.abs()),
-        if longer < 0.0 { "less" } else { "more" },
-        number::brief(100.0 * median, 3),
-    ));
-    sentences
-}
-
-/// What a frame took more to render than with the incumbent alone; negative if less.
-fn extra_ms(frame: &FrameRecord, probe: &ProbeRecord) -> Option<f64> {
-    let time = frames::time(frame)?;
-    let excess = probe.share * (probe.ratio - 1.0);
-    let extra = (time.whole - time.build) * excess / (1.0 + excess);
-    extra.is_finite().then_some(extra)
-}
-
-/// Unknown words are drawn as undecided.
-fn decision_of(probe: &ProbeRecord) -> &str {
-    let known = DECISIONS.iter().any(|(name, ..)| *name == probe.decision);
-    if known { &probe.decision } else { "undecided" }
-}
-
-fn interval(frame: &FrameRecord, probe: &ProbeRecord) -> Interval {
-    Interval {
-        x: frame.frame as f64,
-        y: probe.ratio,
-        lower: probe.lower,
-        upper: probe.upper,
-        title: format!(
-            "frame {}: {}, ratio {} ({} to {}), {} pairs, {} % of the tiles\n{}",
-            frame.frame,
-            probe.decision,
-            number::ratio(probe.ratio),
-            number::ratio(probe.lower),
-            number::ratio(probe.upper),
-            probe.pairs,
-            number::brief(100.0 * probe.share, 3),
-            plots::configuration(frame),
-        ),
-    }
+fn title(frame: &FrameRecord, probe: &ProbeRecord) -> String {
+    format!(
+        "probe in frame {}: {}, {} ({} to {}), {} on {} % of the tiles",
+        frame.frame,
+        probe.decision,
+        number::ratio(probe.ratio),
+        number::ratio(probe.lower),
+        number::ratio(probe.upper),
+        number::counted(probe.pairs, "pair"),
+        number::significant(100.0 * probe.share, 3)
+    )
 }
 
 #[cfg(test)]
@@ -172,50 +255,69 @@ mod tests {
     use crate::report::example;
 
     #[test]
-    fn every_probe_is_drawn_with_its_decision() {
+    fn what_a_probe_costs_is_found_again() {
+        // With the incumbent 100 ms; 20 to build; a quarter of the tiles takes twice as long.
+        let mut frame = example::frame(0);
+        frame.build_ms = Some(20.0);
+        frame.frame_ms = Some(20.0 + 100.0 * (0.75 + 0.25 * 2.0));
+        let probe = ProbeRecord {
+            share: 0.25,
+            pairs: 30,
+            ratio: 2.0,
+            lower: 1.9,
+            upper: 2.1,
+            decision: "rejected".to_string(),
+        };
+        let found = cost(&(&frame, &probe)).unwrap();
+        assert!((found.build - 0.020).abs() < 1e-12);
+        assert!((found.tiles - 0.025).abs() < 1e-12, "{found:?}");
+        // A faster candidate gives time back.
+        let faster = ProbeRecord {
+            ratio: 0.5,
+            ..probe.clone()
+        };
+        assert!(cost(&(&frame, &faster)).unwrap().tiles < 0.0);
+        let none = ProbeRecord {
+            ratio: f64::NAN,
+            ..probe
+        };
+        assert_eq!(cost(&(&frame, &none)), None);
+    }
+
+    #[test]
+    fn every_probe_is_drawn_and_counted() {
         let run = example::probed(60);
-        let probes = probes(&run.frames);
-        assert!(probes.len() > 10);
-        let drawn = plot(&probes).unwrap();
-        for (frame, probe) in &probes {
-            if probe.ratio.is_finite() {
-                let title = format!("<title>frame {}: {}", frame.frame, probe.decision);
-                assert_eq!(drawn.matches(&title).count(), 1, "{title}");
+        let html = section(&run);
+        let mut rejected = 0;
+        for frame in &run.frames {
+            let Some(probe) = &frame.probe else { continue };
+            rejected += usize::from(probe.decision == "rejected");
+            if probe.decision != "failed" {
+                assert!(html.contains(&format!("probe in frame {}:", frame.frame)));
             }
         }
+        assert!(html.contains(&format!(
+            "<th scope=\"row\">rejected</th><td class=\"n\">{rejected}</td>"
+        )));
+        assert!(!html.contains("NaN") && !html.contains("inf\""));
     }
 
     #[test]
-    fn shares_and_costs_are_said() {
-        let mut frames = vec![example::frame(0), example::frame(1)];
-        for (frame, decision) in frames.iter_mut().zip(["rejected", "accepted"]) {
-            frame.frame_ms = Some(115.0);
-            frame.build_ms = Some(5.0);
-            frame.probe = Some(example::probe(1.5, decision));
-            frame.probe.as_mut().unwrap().share = 0.2;
+    fn a_run_without_probes_says_so() {
+        let html = section(&example::run(20));
+        assert!(html.contains("No candidate was probed") && !html.contains("<svg"));
+    }
+
+    #[test]
+    fn probes_without_ratios_are_counted_alone() {
+        let mut run = example::probed(20);
+        let probes = run.frames.iter_mut();
+        for probe in probes.filter_map(|frame| frame.probe.as_mut()) {
+            probe.ratio = f64::NAN;
+            probe.decision = "a new word".to_string();
         }
-        // 110 ms are 1.1 times the 100 ms that the incumbent would have taken.
-        let said = sentences(&probes(&frames));
-        assert_eq!(said[0], "2 probes: rejected 1 (50 %), accepted 1 (50 %).");
-        assert!(said[1].contains("cost 10.0 ms of building"), "{}", said[1]);
-        assert!(said[1].contains("took 20.0 ms more"), "{}", said[1]);
-        assert!(said[1].contains("had 20 % of"), "{}", said[1]);
-    }
-
-    #[test]
-    fn probes_without_a_ratio_are_counted_and_not_drawn() {
-        let mut frame = example::frame(0);
-        frame.probe = Some(example::probe(f64::NAN, "failed"));
-        let frames = [frame];
-        assert_eq!(plot(&probes(&frames)), None);
-        assert!(sentences(&probes(&frames))[0].contains("failed 1 (100 %)"));
-    }
-
-    #[test]
-    fn unknown_decisions_are_drawn() {
-        let mut frame = example::frame(0);
-        frame.probe = Some(example::probe(1.1, "postponed"));
-        let drawn = plot(&probes(std::slice::from_ref(&frame))).unwrap();
-        assert!(drawn.contains("frame 0: postponed"));
+        let html = section(&run);
+        assert!(html.contains("a new word") && html.contains("No probe has a ratio"));
+        assert!(html.contains("What they cost is not known"));
     }
 }

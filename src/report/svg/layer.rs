@@ -159,9 +159,15 @@ impl Place {
     fn interval(&self, class: &str, marker: Marker, one: &Interval) -> Option<String> {
         let (x, y) = (self.x(one.x)?, self.y(one.y)?);
         let inside = |y: f64| y.clamp(self.area.top, self.area.bottom);
-        let lower = self.y(one.lower).map_or(self.area.bottom, inside);
-        let upper = self.y(one.upper).map_or(self.area.top, inside);
-        let whisker = line(&format!("error {class}"), (x, lower), (x, upper));
+        let (lower, upper) = (self.y(one.lower), self.y(one.upper));
+        let open = if lower.is_none() || upper.is_none() {
+            " unbounded"
+        } else {
+            ""
+        };
+        let lower = lower.map_or(self.area.bottom, inside);
+        let upper = upper.map_or(self.area.top, inside);
+        let whisker = line(&format!("error{open} {class}"), (x, lower), (x, upper));
         Some(whisker + &marker.draw(class, x, y, 3.5, &one.title))
     }
 }
@@ -192,7 +198,10 @@ impl Layer {
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.x_values().is_empty() && self.y_values().is_empty()
+        match self {
+            Layer::Level { y, .. } => !y.is_finite(),
+            _ => self.x_values().is_empty() && self.y_values().is_empty(),
+        }
     }
 
     pub(super) fn x_values(&self) -> Vec<f64> {

@@ -45,7 +45,7 @@ impl Plot<'_> {
         let y_values = self.layers.iter().flat_map(Layer::y_values);
         let y_axis = match self.y_range {
             Range::Fitted => Axis::fitting(y_values),
-            Range::FromZero(most) => Axis::from_zero(y_values.map(|y| y.min(most))),
+            Range::FromZero(most) => Axis::from_zero(y_values.map(|y| (1.03 * y).min(most))),
             Range::Decades => Axis::decades(y_values),
         };
         let (legend, legend_height) = self.legend();
