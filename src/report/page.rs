@@ -117,6 +117,9 @@ fn search(
             number::count(drawn.len())
         ));
     }
+    if drawn.is_empty() {
+        return html + "<p>Every trial failed: there are no costs to show.</p>\n";
+    }
     html.push_str(&figure(
         &plots::history(&run.frames, &drawn, compared),
         &history_caption(compared, failures),
@@ -148,7 +151,7 @@ fn all_frames(run: &RunRecord, parameters: &[String]) -> String {
 fn history_caption(compared: &[ComparisonRow], failures: &[Failure]) -> String {
     let mut caption =
         "Each mark is what the search was told of one configuration; the stepped line \
-                       is the lowest cost so far"
+                       is the cost of the incumbent, as it was known then"
             .to_string();
     if !compared.is_empty() {
         caption.push_str(
@@ -158,6 +161,10 @@ fn history_caption(compared: &[ComparisonRow], failures: &[Failure]) -> String {
     }
     if !failures.is_empty() {
         caption.push_str("; crosses at the upper edge are failed trials");
+        let failed: usize = failures.iter().map(|failure| failure.frames.len()).sum();
+        if failed > plots::MOST_CROSSES {
+            caption.push_str(", of many only some");
+        }
     }
     caption + "."
 }
@@ -222,11 +229,18 @@ fn search_space(
         ));
     }
     html.push_str("</div>\n");
+    let (varied, constant) = trials::varied(trials, parameters);
+    let constant = match constant.as_slice() {
+        [] => String::new(),
+        names => format!(" Not varied: {}.", names.join(", ")),
+    };
     html.push_str(&figure(
-        &plots::parameters(drawn, parameters),
-        "Each line is one configuration and crosses every axis at its value, the last axis at its \
-         cost: where lines of the best colour run together, a parameter matters; the thick line is \
-         the best. Failed trials are not shown.",
+        &plots::parameters(drawn, &varied),
+        &format!(
+            "Each line is one configuration and crosses every axis at its value, the last axis at \
+             its cost: where lines of the best colour run together, a parameter matters; the thick \
+             line is the best. Failed trials are not shown.{constant}"
+        ),
     ));
     html.push_str(&leaf_map::section(trials));
     html

@@ -23,6 +23,8 @@ const CLASSES: [&str; 3] = ["s1", "s2", "s3"];
 /// Gain over the frames of a run.
 #[derive(Clone, Debug, PartialEq)]
 struct Gain {
+    /// Seconds before the first frame.
+    start: f64,
     /// Frames done, and seconds gained until then.
     sums: Vec<(f64, f64)>,
     standing: Standing,
@@ -38,7 +40,8 @@ enum Standing {
 }
 
 fn gain(frames: &[FrameRecord], reference_ms: f64, first_build_ms: f64) -> Gain {
-    let mut sum = first_build_ms / 1e3;
+    let start = first_build_ms / 1e3;
+    let mut sum = start;
     let mut sums = Vec::new();
     let mut since = 1;
     for (index, frame) in frames.iter().enumerate() {
@@ -57,7 +60,11 @@ fn gain(frames: &[FrameRecord], reference_ms: f64, first_build_ms: f64) -> Gain 
     } else {
         Standing::Ahead { since }
     };
-    Gain { sums, standing }
+    Gain {
+        start,
+        sums,
+        standing,
+    }
 }
 
 /// The gains against `row`; `None` if its cost is no number or no frame left a time.
@@ -181,9 +188,13 @@ fn plot(gains: &[(usize, &ComparisonRow, Gain)]) -> String {
         layers.push(Layer::Line {
             name: format!("against {}", row.name),
             class,
-            points: gain.sums.clone(),
+            points: std::iter::once((0.0, gain.start))
+                .chain(gain.sums.iter().copied())
+                .collect(),
         });
+        // What was never behind has no break-even.
         if let Standing::Ahead { since } = gain.standing
+            && since > 1
             && let Some(&(x, y)) = gain.sums.iter().find(|(done, _)| *done >= since as f64)
         {
             layers.push(Layer::Marks {

@@ -86,7 +86,8 @@ fn explanation(trials: usize, constant: &[&str]) -> String {
     let mut text = format!(
         "From {trials} trials, each parameter by itself. These are main effects only: what two \
          parameters do together would need a model or a plan of trials, and a search tries most \
-         near its best, where differences are small. A share near that of chance is none."
+         near its best, where differences are small. A share near that of chance is none. A parameter that a trial \
+         does not read counts with the value in the log."
     );
     if !constant.is_empty() {
         text.push_str(&format!(" Not varied: {}.", constant.join(", ")));

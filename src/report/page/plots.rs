@@ -20,7 +20,7 @@ const NARROW: Size = Size {
     height: 380.0,
 };
 /// Crosses of failed trials that have room at the upper edge.
-const MOST_CROSSES: usize = 400;
+pub(super) const MOST_CROSSES: usize = 120;
 /// The style sheet tells so many compared configurations apart.
 const SERIES: usize = 4;
 
@@ -63,7 +63,7 @@ pub(super) fn history(
 ) -> String {
     let mut layers = compared_levels(compared);
     layers.push(Layer::Steps {
-        name: "lowest cost so far".to_string(),
+        name: "cost of the incumbent".to_string(),
         class: "incumbent",
         points: frames
             .iter()

@@ -124,6 +124,26 @@ pub(super) fn parameters<'a>(
     names
 }
 
+/// The parameters of which the trials have more than one value, or some none, and the others with
+/// their value.
+pub(super) fn varied(trials: &[Trial<'_>], parameters: &[String]) -> (Vec<String>, Vec<String>) {
+    let mut varied = Vec::new();
+    let mut constant = Vec::new();
+    for name in parameters {
+        let mut values = trials
+            .iter()
+            .map(|trial| value_of(&trial.frame.config, name));
+        let first = values.next().flatten();
+        match first {
+            Some(value) if values.all(|other| other == first) => {
+                constant.push(format!("{name} = {value}"));
+            }
+            _ => varied.push(name.clone()),
+        }
+    }
+    (varied, constant)
+}
+
 /// The value of a parameter.
 pub(super) fn value_of<'a>(config: &'a [(String, String)], name: &str) -> Option<&'a str> {
     config
@@ -260,6 +280,21 @@ mod tests {
         assert_eq!(parameters(&configs), ["b", "a", "c"]);
         assert_eq!(value_of(&configs[0], "a"), Some("1"));
         assert_eq!(value_of(&configs[0], "c"), None);
+    }
+
+    #[test]
+    fn a_parameter_that_some_lack_is_varied() {
+        let mut frames = with_costs(&[1.0, 2.0]);
+        let config = |names: &[(&str, &str)]| -> Vec<(String, String)> {
+            let pair = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+            names.iter().map(pair).collect()
+        };
+        frames[0].config = config(&[("a", "1"), ("b", "1"), ("c", "1")]);
+        frames[1].config = config(&[("a", "1"), ("b", "2")]);
+        let names = ["a", "b", "c"].map(str::to_string);
+        let (some, others) = varied(&measured(&frames), &names);
+        assert_eq!(some, ["b", "c"]);
+        assert_eq!(others, ["a = 1"]);
     }
 
     #[test]
