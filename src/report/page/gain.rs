@@ -39,6 +39,17 @@ enum Standing {
     Behind,
 }
 
+impl Gain {
+    /// The point after which the run stays ahead; `None` if it was never behind, or still is.
+    fn break_even(&self) -> Option<(f64, f64)> {
+        let Standing::Ahead { since } = self.standing else {
+            return None;
+        };
+        let mut after = self.sums.iter().filter(|(done, _)| *done >= since as f64);
+        (since > 1).then(|| after.next().copied())?
+    }
+}
+
 fn gain(frames: &[FrameRecord], reference_ms: f64, first_build_ms: f64) -> Gain {
     let start = first_build_ms / 1e3;
     let mut sum = start;
@@ -109,12 +120,17 @@ pub(super) fn section(run: &RunRecord) -> String {
             if count == 1 { "is" } else { "are" }
         ),
     };
+    let has_break_even = gains.iter().any(|(_, _, gain)| gain.break_even().is_some());
     html.push_str(&figure(
         &plot(&gains),
         &format!(
             "Time that the same number of frames would have taken with the baseline, less the time \
-             that the run took, builds and failures included: above zero the run is ahead. \
-             Diamonds mark break-even, after which it stays ahead.{remark}"
+             that the run took, builds and failures included: above zero the run is ahead.{}{remark}",
+            if has_break_even {
+                " Diamonds mark break-even, after which it stays ahead."
+            } else {
+                ""
+            }
         ),
     ));
     html
@@ -192,11 +208,7 @@ fn plot(gains: &[(usize, &ComparisonRow, Gain)]) -> String {
                 .chain(gain.sums.iter().copied())
                 .collect(),
         });
-        // What was never behind has no break-even.
-        if let Standing::Ahead { since } = gain.standing
-            && since > 1
-            && let Some(&(x, y)) = gain.sums.iter().find(|(done, _)| *done >= since as f64)
-        {
+        if let Some((x, y)) = gain.break_even() {
             layers.push(Layer::Marks {
                 name: String::new(),
                 marker: Marker::Diamond,
