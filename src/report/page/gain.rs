@@ -2,7 +2,8 @@
 //!
 //! The reference of a frame is the median cost of the baseline in the comparison at the end; a
 //! baseline whose cost has no build is charged one, before the first frame. Frames without a time
-//! are in neither sum. Break-even is the frame after which the run stays ahead.
+//! are in neither sum. Break-even is the frame after which the run stays ahead. Poor if the machine
+//! changed its speed before the end, which is said where the tuned configuration shows it.
 
 use super::verdict::{Outcome, comparison, outcome};
 use super::{figure, frames::whole_ms};
@@ -19,6 +20,10 @@ const SIZE: Size = Size {
 };
 /// The classes of the baselines: those which they have in the comparison, behind the tuned row.
 const CLASSES: [&str; 3] = ["s1", "s2", "s3"];
+
+/// The tuned configuration at the end over its cost in the search: beyond this factor, in either
+/// direction, the machine has changed. The winner's curse alone is less.
+const DRIFT: f64 = 1.15;
 
 /// Gain over the frames of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,6 +116,9 @@ pub(super) fn section(run: &RunRecord) -> String {
         let sentence = sentence(tuned, row, gain);
         html.push_str(&format!("<p>{}</p>\n", escape(&sentence)));
     }
+    if let Some(warning) = drift(run, tuned) {
+        html.push_str(&format!("<p class=\"caveat\">{}</p>\n", escape(&warning)));
+    }
     let untimed = run.frames.iter().filter(|frame| whole_ms(frame).is_none());
     let remark = match untimed.count() {
         0 => String::new(),
@@ -134,6 +142,31 @@ pub(super) fn section(run: &RunRecord) -> String {
         ),
     ));
     html
+}
+
+/// A warning if the references are of a machine that had another speed than in the search.
+fn drift(run: &RunRecord, tuned: &ComparisonRow) -> Option<String> {
+    let in_search = run
+        .frames
+        .iter()
+        .rev()
+        .find_map(|frame| frame.incumbent_cost_ms)?;
+    let ratio = tuned.cost_ms.median / in_search;
+    if !ratio.is_finite() {
+        return None;
+    }
+    let (comparative, consequence) = if ratio > DRIFT {
+        ("slower", "flatters")
+    } else if ratio < 1.0 / DRIFT {
+        ("faster", "belittles")
+    } else {
+        return None;
+    };
+    Some(format!(
+        "At the end the tuned configuration cost {} × what it had cost in the search. The machine \
+         was probably {comparative} then, for the baselines too, which {consequence} the sums.",
+        number::ratio(ratio)
+    ))
 }
 
 /// The standing against a baseline in words.
@@ -307,6 +340,26 @@ mod tests {
         // 24 ms of build.
         let html = section(&run);
         assert!(html.contains("23.0 ms gained"), "{html}");
+    }
+
+    #[test]
+    fn a_machine_that_changed_is_told() {
+        let mut run = run_with(&[20.0], 2.0);
+        for (in_search, said) in [
+            (
+                5.0,
+                Some("2.00 × what it had cost in the search. The machine was probably slower"),
+            ),
+            (9.5, None),
+            (20.0, Some("probably faster")),
+            (0.0, None),
+            (f64::NAN, None),
+        ] {
+            run.frames[0].incumbent_cost_ms = Some(in_search);
+            let html = section(&run);
+            assert_eq!(html.contains("caveat"), said.is_some(), "{in_search}");
+            assert!(said.is_none_or(|said| html.contains(said)), "{html}");
+        }
     }
 
     #[test]
