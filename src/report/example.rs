@@ -1,7 +1,8 @@
 //! Runs for tests, made by arithmetic: shaped as real ones are, the same on every machine.
 
 use super::record::{
-    ComparisonRow, FrameRecord, RunHeader, RunRecord, RunSummary, SCHEMA_VERSION, Spread,
+    ComparisonRow, FrameRecord, ProbeRecord, RunHeader, RunRecord, RunSummary, SCHEMA_VERSION,
+    Spread,
 };
 
 /// A finished run that won, with `frames` frames; one in sixteen fails.
@@ -73,6 +74,70 @@ pub(crate) fn frame(index: usize) -> FrameRecord {
         frame_ms: None,
         probe: None,
         reason: None,
+    }
+}
+
+/// A run of probes beside an incumbent that gets better: of twelve frames one is the incumbent's
+/// alone and one fails.
+pub(crate) fn probed(frames: usize) -> RunRecord {
+    let mut run = run(frames);
+    run.header.metric = "total".to_string();
+    run.header.policy = Some("probes".to_string());
+    run.header.frames_per_tree = Some(16.0);
+    let mut incumbent = 55.0;
+    for (index, frame) in run.frames.iter_mut().enumerate() {
+        let build = frame.build_ms;
+        (frame.failure, frame.is_incumbent) = (None, index == 0);
+        frame.reason = Some("gaussian-process: expected improvement".to_string());
+        let noise = 1.0 + (pick(index, 10, 100) as f64 - 50.0) / 4000.0;
+        if index == 0 || index % 12 == 7 {
+            frame.reason = Some(if index == 0 { "start" } else { "incumbent" }.to_string());
+            frame.build_ms = (index == 0).then_some(24.0);
+            frame.render_ms = Some(incumbent * noise);
+            frame.frame_ms = Some(incumbent * noise + if index == 0 { 24.0 } else { 0.0 });
+        } else if index % 12 == 11 {
+            frame.failure = Some("the tree is deeper than 17 levels".to_string());
+            (frame.build_ms, frame.render_ms) = (None, None);
+            frame.frame_ms = Some(incumbent * noise + 3.0);
+            frame.probe = Some(probe(0.0, 0, f64::NAN, "failed"));
+        } else {
+            let ratio = 0.93 + pick(index, 11, 100) as f64 / 160.0;
+            let (share, pairs, decision) = match ratio {
+                ratio if ratio < 0.97 => (0.8, 60, "accepted"),
+                ratio if ratio > 1.5 => (1.0 / 32.0, 3, "given up"),
+                ratio if ratio > 1.04 => (0.125, 30, "rejected"),
+                _ => (0.5, 120, "undecided"),
+            };
+            frame.probe = Some(probe(share, pairs, ratio, decision));
+            frame.render_ms = Some(incumbent * ratio);
+            let rendering = incumbent * noise * (1.0 + share * (ratio - 1.0));
+            frame.frame_ms = Some(build.unwrap_or(20.0) + rendering);
+            if decision == "accepted" && incumbent * ratio > 36.0 {
+                incumbent *= ratio;
+                frame.is_incumbent = true;
+            }
+        }
+        frame.cost_ms = frame
+            .render_ms
+            .map(|render| render + build.unwrap_or(20.0) / 16.0);
+        frame.incumbent_cost_ms = Some(incumbent + 1.5);
+    }
+    run
+}
+
+fn probe(share: f64, pairs: usize, ratio: f64, decision: &str) -> ProbeRecord {
+    let deviation = if pairs < 5 {
+        f64::INFINITY
+    } else {
+        1.645 * 0.2 / (pairs as f64).sqrt()
+    };
+    ProbeRecord {
+        share,
+        pairs,
+        ratio,
+        lower: ratio * (-deviation).exp(),
+        upper: ratio * deviation.exp(),
+        decision: decision.to_string(),
     }
 }
 

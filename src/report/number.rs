@@ -62,6 +62,21 @@ pub(crate) fn milliseconds(value: f64) -> String {
     }
 }
 
+/// A time in seconds, with the unit that it is read in.
+pub(crate) fn seconds(value: f64) -> String {
+    if value.is_finite() && value.abs() >= 1.0 {
+        format!("{} s", significant(value, 3))
+    } else {
+        milliseconds(1e3 * value)
+    }
+}
+
+/// A count with what is counted, a word whose plural ends in s.
+pub(crate) fn counted(value: usize, word: &str) -> String {
+    let plural = if value == 1 { "" } else { "s" };
+    format!("{} {word}{plural}", count(value))
+}
+
 /// A ratio of two times: a third decimal within 10 % of equality, where it decides.
 pub(crate) fn ratio(value: f64) -> String {
     if (value - 1.0).abs() < 0.1 {
@@ -126,6 +141,27 @@ mod tests {
             assert_eq!(milliseconds(value), NOT_A_NUMBER);
             assert_eq!(ratio(value), NOT_A_NUMBER);
         }
+    }
+
+    #[test]
+    fn seconds_below_one_are_milliseconds() {
+        let cases = [
+            (0.02, "20.0 ms"),
+            (1.0, "1.00 s"),
+            (-75.0, "-75.0 s"),
+            (0.0, "0 ms"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(seconds(value), text);
+        }
+        assert_eq!(seconds(f64::INFINITY), NOT_A_NUMBER);
+    }
+
+    #[test]
+    fn one_is_not_a_plural() {
+        assert_eq!(counted(1, "frame"), "1 frame");
+        assert_eq!(counted(12_000, "frame"), "12\u{202f}000 frames");
+        assert_eq!(counted(0, "pair"), "0 pairs");
     }
 
     #[test]

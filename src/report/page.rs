@@ -7,7 +7,13 @@
 //! `n/a`.
 
 mod base64;
+mod frames;
+mod gain;
+mod importance;
+mod leaf_map;
 mod plots;
+mod probes;
+mod regret;
 pub(super) mod table;
 mod tables;
 mod trials;
@@ -24,6 +30,12 @@ use trials::{Failure, Trial};
 const STYLE_SHEET: &str = include_str!("page/style.css");
 /// Length of the table of the best configurations.
 const BEST_SHOWN: usize = 10;
+/// Of more trials than these only some are drawn one by one: a page should open at once.
+const MOST_DRAWN: usize = 600;
+/// Of more frames than these the table lists the first and the last.
+const MOST_LISTED: usize = 1000;
+/// Shown where a value does not exist.
+const ABSENT: &str = "–";
 
 /// A picture in a page; `png` is its file.
 pub(super) fn picture(alt: &str, png: &[u8]) -> String {
@@ -58,14 +70,14 @@ pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
     }
     body.push_str(&comparison(run));
     if !run.frames.is_empty() {
-        body.push_str("<h2>Search</h2>\n");
-        body.push_str(&figure(
-            &plots::history(&run.frames, &trials, compared),
-            &history_caption(compared, &failures),
-        ));
+        body.push_str(&gain::section(run));
+        body.push_str(&frames::section(run, compared));
+        body.push_str(&probes::section(run));
+        body.push_str(&search(run, compared, &trials, &failures));
     }
     if !trials.is_empty() {
         body.push_str(&search_space(run, compared, &trials, &parameters));
+        body.push_str(&importance::section(&trials, &parameters));
         body.push_str(&best(&trials, &parameters));
     }
     if !failures.is_empty() {
@@ -78,11 +90,7 @@ pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
         ));
     }
     if !run.frames.is_empty() {
-        body.push_str(&format!(
-            "<details><summary>All {} frames</summary>\n{}</details>\n",
-            number::count(run.frames.len()),
-            tables::frames(&run.frames, &parameters).html()
-        ));
+        body.push_str(&all_frames(run, &parameters));
     }
     body.push_str(&format!(
         "<h2>Settings</h2>\n<div class=\"pair\">\n<div>{}</div>\n<div>{}</div>\n</div>\n",
@@ -92,11 +100,59 @@ pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
     document(&format!("{}: tuning of the tree", header.scene), &body)
 }
 
+/// What the search was told, and how far from its best it was.
+fn search(
+    run: &RunRecord,
+    compared: &[ComparisonRow],
+    trials: &[Trial<'_>],
+    failures: &[Failure],
+) -> String {
+    let drawn = trials::thinned(trials, MOST_DRAWN);
+    let mut html = "<h2>Search</h2>\n".to_string();
+    if drawn.len() < trials.len() {
+        html.push_str(&format!(
+            "<p>Of {} trials {} are drawn here and below: every new incumbent, the best, and every \
+             so many of the others.</p>\n",
+            number::count(trials.len()),
+            number::count(drawn.len())
+        ));
+    }
+    if drawn.is_empty() {
+        return html + "<p>Every trial failed: there are no costs to show.</p>\n";
+    }
+    html.push_str(&figure(
+        &plots::history(&run.frames, &drawn, compared),
+        &history_caption(compared, failures),
+    ));
+    html.push_str(&regret::section(trials, compared));
+    html
+}
+
+/// The table of the frames, behind a heading that opens it.
+fn all_frames(run: &RunRecord, parameters: &[String]) -> String {
+    let count = number::count(run.frames.len());
+    if run.frames.len() <= MOST_LISTED {
+        return format!(
+            "<details><summary>All {count} frames</summary>\n{}</details>\n",
+            tables::frames(&run.frames, parameters).html()
+        );
+    }
+    let (first, _) = run.frames.split_at(MOST_LISTED / 2);
+    let (_, last) = run.frames.split_at(run.frames.len() - MOST_LISTED / 2);
+    format!(
+        "<details><summary>The first and the last {} of {count} frames</summary>\n<p>The log has \
+         all.</p>\n{}</details>\n",
+        MOST_LISTED / 2,
+        tables::frames(&[first, last].concat(), parameters).html()
+    )
+}
+
 /// Explains what is in the plot and nothing that is not.
 fn history_caption(compared: &[ComparisonRow], failures: &[Failure]) -> String {
-    let mut caption = "Each mark is one frame with one configuration; the stepped line is the \
-                       lowest cost so far"
-        .to_string();
+    let mut caption =
+        "Each mark is what the search was told of one configuration; the stepped line \
+                       is the cost of the incumbent, as it was known then"
+            .to_string();
     if !compared.is_empty() {
         caption.push_str(
             "; horizontal lines are the compared configurations, measured at the end, with their \
@@ -105,6 +161,10 @@ fn history_caption(compared: &[ComparisonRow], failures: &[Failure]) -> String {
     }
     if !failures.is_empty() {
         caption.push_str("; crosses at the upper edge are failed trials");
+        let failed: usize = failures.iter().map(|failure| failure.frames.len()).sum();
+        if failed > plots::MOST_CROSSES {
+            caption.push_str(", of many only some");
+        }
     }
     caption + "."
 }
@@ -151,16 +211,17 @@ fn search_space(
     trials: &[Trial<'_>],
     parameters: &[String],
 ) -> String {
+    let drawn = &trials::thinned(trials, MOST_DRAWN);
     let legend = plots::rank_legend(&run.frames);
     let mut html = format!(
         "<h2>Configurations</h2>\n<div class=\"scroll\" tabindex=\"0\">{legend}</div>\n<div class=\"pair\">\n"
     );
     html.push_str(&figure(
-        &plots::build_and_render(trials, compared),
+        &plots::build_and_render(drawn, compared),
         "Each circle is one frame: the further left, the faster its tree was built, the lower, the \
          faster the picture was rendered.",
     ));
-    if let Some(plot) = plots::leaf_sizes(trials) {
+    if let Some(plot) = plots::leaf_sizes(drawn) {
         html.push_str(&figure(
             &plot,
             "Each circle is one frame at its two leaf sizes: where circles of the best colour \
@@ -168,12 +229,20 @@ fn search_space(
         ));
     }
     html.push_str("</div>\n");
+    let (varied, constant) = trials::varied(trials, parameters);
+    let constant = match constant.as_slice() {
+        [] => String::new(),
+        names => format!(" Not varied: {}.", names.join(", ")),
+    };
     html.push_str(&figure(
-        &plots::parameters(trials, parameters),
-        "Each line is one configuration and crosses every axis at its value, the last axis at its \
-         cost: where lines of the best colour run together, a parameter matters; the thick line is \
-         the best. Failed trials are not shown.",
+        &plots::parameters(drawn, &varied),
+        &format!(
+            "Each line is one configuration and crosses every axis at its value, the last axis at \
+             its cost: where lines of the best colour run together, a parameter matters; the thick \
+             line is the best. Failed trials are not shown.{constant}"
+        ),
     ));
+    html.push_str(&leaf_map::section(trials));
     html
 }
 
@@ -220,178 +289,4 @@ pub(super) fn document(title: &str, body: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::example;
-    use crate::report::record::{FrameRecord, Spread};
-
-    /// What a page must not have, whatever the run: foreign files, script, numbers that are none.
-    fn assert_sound(html: &str) {
-        for foreign in [
-            "http://", "https://", "src=\"//", "url(", "@import", "<script",
-        ] {
-            assert!(!html.contains(foreign), "{foreign}");
-        }
-        for number in ["NaN", "inf\"", ">inf", "-inf", "\"-0.0\""] {
-            assert!(!html.contains(number), "{number}");
-        }
-        let mut open: Vec<&str> = Vec::new();
-        for piece in html.split('<').skip(1) {
-            let tag = piece.split('>').next().unwrap();
-            let name = tag.split([' ', '\n']).next().unwrap();
-            let void = tag.ends_with('/') || ["!DOCTYPE", "meta", "img", "wbr"].contains(&name);
-            if let Some(closed) = name.strip_prefix('/') {
-                assert_eq!(open.pop(), Some(closed), "{tag}");
-            } else if !void {
-                open.push(name);
-            }
-        }
-        assert_eq!(open, [""; 0]);
-    }
-
-    fn failed(frame: &mut FrameRecord) {
-        frame.build_ms = None;
-        frame.render_ms = None;
-        frame.cost_ms = None;
-        frame.incumbent_cost_ms = None;
-        frame.failure = Some("too deep".to_string());
-    }
-
-    #[test]
-    fn the_page_has_every_frame_parameter_indicator_and_configuration() {
-        let run = example::run(80);
-        let html = page(&run, None);
-        assert_sound(&html);
-        for frame in &run.frames {
-            let number = frame.frame;
-            assert!(html.contains(&format!("<tr><th scope=\"row\" class=\"n\">{number}</th>")));
-            assert!(
-                html.contains(&format!("<title>frame {number}:")),
-                "{number}"
-            );
-        }
-        for (name, value) in &run.frames[0].config {
-            assert!(html.contains(&format!(">{name}</th>")), "{name}");
-            assert!(html.contains(&format!("{name} = {value}")), "{name}");
-        }
-        for (name, _) in &run.header.indicators {
-            assert!(html.contains(name.as_str()), "{name}");
-        }
-        assert!(html.contains("Tuned for render time: 1.32 × faster than Table 1&#39;s default"));
-        assert!(html.contains("1.040 × faster than Embree&#39;s scene setting"));
-        assert_eq!(html.matches("<figcaption>").count(), 5);
-    }
-
-    #[test]
-    fn the_picture_is_inside() {
-        let html = page(&example::run(2), Some(b"foobar"));
-        assert!(html.contains("src=\"data:image/png;base64,Zm9vYmFy\""));
-        assert!(!page(&example::run(2), None).contains("<img"));
-    }
-
-    #[test]
-    fn names_with_special_characters_are_harmless() {
-        let evil = "</title><script>&\"'";
-        let mut run = example::run(20);
-        run.header.scene = evil.to_string();
-        run.header.search = evil.to_string();
-        run.header.indicators[0].0 = evil.to_string();
-        for frame in &mut run.frames {
-            frame.config[0] = (evil.to_string(), evil.to_string());
-        }
-        run.frames[11].failure = Some(evil.to_string());
-        let comparison = &mut run.summary.as_mut().unwrap().comparison;
-        comparison[1].name = evil.to_string();
-        comparison[1].config[0].1 = evil.to_string();
-        let html = page(&run, None);
-        assert_sound(&html);
-        assert!(html.contains("&lt;/title&gt;&lt;script&gt;&amp;&quot;&#39;"));
-    }
-
-    #[test]
-    fn no_frame_is_a_page() {
-        let mut run = example::run(0);
-        run.summary = None;
-        run.header.frames_planned = 80;
-        run.header.indicators.clear();
-        let html = page(&run, None);
-        assert_sound(&html);
-        assert!(html.contains("no frame has been tried"));
-        assert!(html.contains("0 of 80 planned frames"));
-        assert!(html.contains("no comparison"));
-    }
-
-    #[test]
-    fn one_frame_is_a_page() {
-        let html = page(&example::run(1), None);
-        assert_sound(&html);
-        assert!(html.contains("<title>frame 0:"));
-    }
-
-    #[test]
-    fn only_failures_are_a_page() {
-        let mut run = example::run(9);
-        run.frames.iter_mut().for_each(failed);
-        run.summary = None;
-        let html = page(&run, None);
-        assert_sound(&html);
-        assert!(html.contains("9 of 9 trials failed"));
-        assert!(
-            !html.contains(">tried<"),
-            "the legend names what is not there"
-        );
-        assert!(html.contains("All frames failed"));
-    }
-
-    #[test]
-    fn an_interrupted_run_says_so() {
-        let mut run = example::run(9);
-        run.header.frames_planned = 80;
-        let summary = run.summary.as_mut().unwrap();
-        summary.interrupted = true;
-        summary.comparison.clear();
-        let html = page(&run, None);
-        assert_sound(&html);
-        assert!(html.contains("interrupted: 9 of 80"));
-        assert!(html.contains("no comparison"));
-    }
-
-    #[test]
-    fn extreme_and_equal_numbers_are_drawn() {
-        for cost in [
-            0.0,
-            5e-324,
-            1e-12,
-            31.0,
-            1e15,
-            1e300,
-            f64::MAX,
-            f64::NAN,
-            f64::INFINITY,
-        ] {
-            let mut run = example::run(12);
-            for frame in &mut run.frames {
-                frame.build_ms = Some(cost);
-                frame.render_ms = Some(cost);
-                frame.cost_ms = Some(cost);
-                frame.incumbent_cost_ms = Some(cost);
-            }
-            let spread = Spread {
-                median: cost,
-                lower: cost,
-                upper: cost,
-            };
-            for row in &mut run.summary.as_mut().unwrap().comparison {
-                row.build_ms = spread;
-                row.render_ms = spread;
-                row.cost_ms = spread;
-                row.cost_ratio_to_tuned = spread;
-            }
-            run.header.indicators[0].1 = cost;
-            assert_sound(&page(&run, None));
-            // And one frame among them that is ordinary.
-            run.frames[5].cost_ms = Some(40.0);
-            assert_sound(&page(&run, None));
-        }
-    }
-}
+mod tests;

@@ -8,6 +8,8 @@
 pub(crate) mod axis;
 pub(crate) mod bars;
 pub(crate) mod color;
+pub(crate) mod heat;
+mod layer;
 pub(crate) mod marker;
 pub(crate) mod parallel;
 pub(crate) mod xy;

@@ -9,7 +9,7 @@ use super::{
     },
     svg::{
         Size,
-        xy::{Layer, Plot},
+        xy::{Layer, Plot, Range},
     },
 };
 use crate::study::steering::{FrameRow, Run, Way};
@@ -157,6 +157,7 @@ fn plot(
         description: label,
         x_label: "time of the sequence, seconds",
         y_label: label,
+        y_range: Range::Fitted,
         layers,
     }
     .draw()

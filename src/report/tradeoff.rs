@@ -10,7 +10,7 @@ use super::{
     svg::{
         Size,
         marker::Marker,
-        xy::{Layer, Mark, Plot},
+        xy::{Layer, Mark, Plot, Range},
     },
 };
 use crate::study::tradeoff::{Knob, Outcome, Tradeoff};
@@ -160,6 +160,7 @@ fn plot(study: &Tradeoff) -> String {
         description: "Error against time of all settings",
         x_label: "time of a picture, ms",
         y_label: "root mean square error, levels of 255",
+        y_range: Range::Fitted,
         layers,
     }
     .draw()

@@ -6,7 +6,7 @@ use crate::report::record::{ComparisonRow, FrameRecord};
 use crate::report::svg::bars::{Bar, bars};
 use crate::report::svg::marker::Marker;
 use crate::report::svg::parallel::{Strand, parallel_coordinates};
-use crate::report::svg::xy::{Layer, Mark, Plot};
+use crate::report::svg::xy::{Layer, Mark, Plot, Range};
 use crate::report::svg::{Size, color};
 
 const WIDE: Size = Size {
@@ -19,6 +19,8 @@ const NARROW: Size = Size {
     width: 420.0,
     height: 380.0,
 };
+/// Crosses of failed trials that have room at the upper edge.
+pub(super) const MOST_CROSSES: usize = 120;
 /// The style sheet tells so many compared configurations apart.
 const SERIES: usize = 4;
 
@@ -42,24 +44,26 @@ pub(super) fn cost_bars(rows: &[ComparisonRow]) -> String {
     )
 }
 
+/// The costs of the compared configurations as levels, with their quartiles as bands.
+pub(super) fn compared_levels(compared: &[ComparisonRow]) -> Vec<Layer> {
+    let level = |(index, row): (usize, &ComparisonRow)| Layer::Level {
+        name: format!("{}, compared", row.name),
+        class: series(index),
+        y: row.cost_ms.median,
+        band: (row.cost_ms.lower, row.cost_ms.upper),
+    };
+    compared.iter().enumerate().map(level).collect()
+}
+
 /// Cost of every frame, the incumbent's cost so far, and the compared configurations as levels.
 pub(super) fn history(
     frames: &[FrameRecord],
     trials: &[Trial<'_>],
     compared: &[ComparisonRow],
 ) -> String {
-    let mut layers: Vec<Layer> = compared
-        .iter()
-        .enumerate()
-        .map(|(index, row)| Layer::Level {
-            name: format!("{}, compared", row.name),
-            class: series(index),
-            y: row.cost_ms.median,
-            band: (row.cost_ms.lower, row.cost_ms.upper),
-        })
-        .collect();
+    let mut layers = compared_levels(compared);
     layers.push(Layer::Steps {
-        name: "lowest cost so far".to_string(),
+        name: "cost of the incumbent".to_string(),
         class: "incumbent",
         points: frames
             .iter()
@@ -90,9 +94,14 @@ pub(super) fn history(
         radius: 4.5,
         marks: marks(true, "incumbent"),
     });
-    let failed: Vec<(f64, String)> = frames
+    let failed: Vec<&FrameRecord> = frames
         .iter()
         .filter(|frame| frame.cost_ms.is_none_or(|cost| !cost.is_finite()))
+        .collect();
+    let stride = failed.len().div_ceil(MOST_CROSSES).max(1);
+    let failed: Vec<(f64, String)> = failed
+        .into_iter()
+        .step_by(stride)
         .map(|frame| {
             let reason = frame.failure.as_deref().unwrap_or("not measured");
             (
@@ -110,6 +119,7 @@ pub(super) fn history(
         description: "Cost of every frame in the order of the search",
         x_label: "frame",
         y_label: "cost (ms)",
+        y_range: Range::Fitted,
         layers,
     }
     .draw()
@@ -143,6 +153,7 @@ pub(super) fn build_and_render(trials: &[Trial<'_>], compared: &[ComparisonRow])
         description: "Build time and render time of every frame",
         x_label: "build (ms)",
         y_label: "render (ms)",
+        y_range: Range::Fitted,
         layers,
     }
     .draw()
@@ -161,6 +172,7 @@ pub(super) fn leaf_sizes(trials: &[Trial<'_>]) -> Option<String> {
             description: "Leaf sizes of every frame",
             x_label: "min_leaf_size (primitives)",
             y_label: "max_leaf_size (primitives)",
+            y_range: Range::Fitted,
             layers: vec![layer],
         }
         .draw()

@@ -1,13 +1,15 @@
 //! The tables of the page, each from the part of the record that it shows.
 
+use super::ABSENT;
+use super::frames::whole_ms;
 use super::table::{Cell, Table};
 use super::trials::{Configuration, Failure, parameters, value_of};
 use super::verdict::{Outcome, metric, outcome};
 use crate::report::number;
 use crate::report::record::{ComparisonRow, FrameRecord, RunHeader, Spread};
 
-/// Shown where a value does not exist.
-const ABSENT: &str = "–";
+/// Spans of frames that are listed for a reason to fail.
+const MOST_SPANS: usize = 16;
 
 /// Times and ratios of the tuned configuration and the baselines.
 pub(super) fn comparison(tuned: &ComparisonRow, baselines: &[ComparisonRow]) -> Table {
@@ -109,11 +111,10 @@ pub(super) fn failures(failures: &[Failure]) -> Table {
     let rows = failures
         .iter()
         .map(|failure| {
-            let frames: Vec<String> = failure.frames.iter().map(usize::to_string).collect();
             vec![
                 Cell::Text(failure.reason.clone()),
                 Cell::Number(number::count(failure.frames.len())),
-                Cell::Text(frames.join(", ")),
+                Cell::Text(spans(&failure.frames)),
             ]
         })
         .collect();
@@ -123,40 +124,86 @@ pub(super) fn failures(failures: &[Failure]) -> Table {
     }
 }
 
-/// All frames in their order.
+/// Numbers that follow one another as spans: 0–3, 7. Of many spans the first.
+fn spans(numbers: &[usize]) -> String {
+    let spans: Vec<String> = numbers
+        .chunk_by(|one, next| one + 1 == *next)
+        .map(|span| match span {
+            [first, .., last] => format!("{first}–{last}"),
+            other => other.iter().map(usize::to_string).collect(),
+        })
+        .collect();
+    let shown = spans.iter().take(MOST_SPANS).cloned().collect::<Vec<_>>();
+    let rest = if spans.len() > shown.len() {
+        ", …"
+    } else {
+        ""
+    };
+    shown.join(", ") + rest
+}
+
+/// Frames in their order. What no frame has, has no column.
 pub(super) fn frames(frames: &[FrameRecord], parameters: &[String]) -> Table {
+    let has_whole = frames.iter().any(|frame| frame.frame_ms.is_some());
+    let has_probe = frames.iter().any(|frame| frame.probe.is_some());
+    let has_reason = frames.iter().any(|frame| frame.reason.is_some());
     let mut head = titles(&[
         "frame",
         "cost (ms)",
         "build (ms)",
         "render (ms)",
         "lowest so far (ms)",
-        "remark",
     ]);
+    let some = [
+        (has_whole, "whole frame (ms)"),
+        (has_probe, "probe: candidate ÷ incumbent"),
+        (has_reason, "reason"),
+        (true, "remark"),
+    ];
+    let some = some.into_iter().filter(|(has, _)| *has);
+    head.extend(some.map(|(_, title)| title.to_string()));
     head.extend(parameters.iter().cloned());
-    let rows = frames
-        .iter()
-        .map(|frame| {
-            let mut cells = vec![Cell::Number(frame.frame.to_string())];
-            cells.extend(
-                [
-                    frame.cost_ms,
-                    frame.build_ms,
-                    frame.render_ms,
-                    frame.incumbent_cost_ms,
-                ]
-                .map(time),
-            );
-            cells.push(Cell::Text(match &frame.failure {
-                Some(reason) => format!("failed: {reason}"),
-                None if frame.is_incumbent => "new incumbent".to_string(),
-                None => String::new(),
-            }));
-            cells.extend(parameters.iter().map(|name| parameter(&frame.config, name)));
-            cells
-        })
-        .collect();
-    Table { head, rows }
+    let row = |frame: &FrameRecord| {
+        let mut cells = vec![Cell::Number(frame.frame.to_string())];
+        let times = [
+            frame.cost_ms,
+            frame.build_ms,
+            frame.render_ms,
+            frame.incumbent_cost_ms,
+        ];
+        cells.extend(times.map(time));
+        if has_whole {
+            cells.push(time(whole_ms(frame)));
+        }
+        if has_probe {
+            let ratio = frame.probe.as_ref().map(|probe| number::ratio(probe.ratio));
+            cells.push(Cell::Number(ratio.unwrap_or_else(|| ABSENT.to_string())));
+        }
+        if has_reason {
+            cells.push(Cell::Text(frame.reason.clone().unwrap_or_default()));
+        }
+        cells.push(Cell::Text(remark(frame)));
+        cells.extend(parameters.iter().map(|name| parameter(&frame.config, name)));
+        cells
+    };
+    Table {
+        head,
+        rows: frames.iter().map(row).collect(),
+    }
+}
+
+fn remark(frame: &FrameRecord) -> String {
+    let mut remarks = Vec::new();
+    if let Some(reason) = &frame.failure {
+        remarks.push(format!("failed: {reason}"));
+    }
+    if let Some(probe) = &frame.probe {
+        remarks.push(probe.decision.clone());
+    }
+    if frame.is_incumbent && frame.failure.is_none() {
+        remarks.push("new incumbent".to_string());
+    }
+    remarks.join(", ")
 }
 
 /// The indicators of the scene.
@@ -196,6 +243,16 @@ pub(super) fn manifest(header: &RunHeader, frames_done: usize) -> Table {
             format!("{}: {}", header.metric, metric(&header.metric)),
         ),
         ("search", header.search.clone()),
+        (
+            "policy",
+            header.policy.clone().unwrap_or_else(|| ABSENT.to_string()),
+        ),
+        (
+            "frames per tree",
+            header
+                .frames_per_tree
+                .map_or_else(|| ABSENT.to_string(), |frames| number::brief(frames, 4)),
+        ),
         // Not grouped: it is copied to a command line.
         ("seed", header.seed.to_string()),
         ("threads", header.threads.to_string()),
@@ -212,6 +269,8 @@ pub(super) fn manifest(header: &RunHeader, frames_done: usize) -> Table {
     ];
     let rows = settings
         .into_iter()
+        // Logs of earlier versions lack some.
+        .filter(|(_, value)| value != ABSENT)
         .map(|(name, value)| vec![Cell::Text(name.to_string()), Cell::Text(value)])
         .collect();
     Table {
@@ -293,6 +352,25 @@ mod tests {
         let table = frames(&run.frames, &[]);
         assert_eq!(table.rows.len(), 12);
         assert!(table.html().contains("failed: the tree is deeper than"));
+    }
+
+    #[test]
+    fn columns_that_no_frame_fills_are_left_out() {
+        let plain = frames(&example::run(12).frames, &[]);
+        assert_eq!(plain.head.len(), 6);
+        let probed = frames(&example::probed(30).frames, &[]);
+        assert_eq!(probed.head.len(), 9);
+        assert!(probed.rows.iter().all(|row| row.len() == 9));
+        let html = probed.html();
+        assert!(html.contains("accepted, new incumbent") && html.contains("rejected"));
+    }
+
+    #[test]
+    fn frames_that_follow_one_another_are_a_span() {
+        assert_eq!(spans(&[0, 1, 2, 5, 7, 8]), "0–2, 5, 7–8");
+        assert_eq!(spans(&[]), "");
+        let every_other: Vec<usize> = (0..100).map(|number| 2 * number).collect();
+        assert!(spans(&every_other).ends_with("30, …"));
     }
 
     #[test]

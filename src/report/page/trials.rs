@@ -49,6 +49,22 @@ pub(super) fn measured(frames: &[FrameRecord]) -> Vec<Trial<'_>> {
         .collect()
 }
 
+/// At most about `limit` of the trials, in their order: every new incumbent, the best tenth of the
+/// limit, and of the others every second, third, …
+pub(super) fn thinned<'a>(trials: &[Trial<'a>], limit: usize) -> Vec<Trial<'a>> {
+    if trials.len() <= limit {
+        return trials.to_vec();
+    }
+    let mut costs: Vec<f64> = trials.iter().map(|trial| trial.cost_ms).collect();
+    costs.sort_by(f64::total_cmp);
+    let good = costs[limit / 10];
+    let stride = trials.len().div_ceil(limit);
+    let kept = trials.iter().enumerate().filter(|(index, trial)| {
+        index % stride == 0 || trial.cost_ms < good || trial.frame.is_incumbent
+    });
+    kept.map(|(_, trial)| *trial).collect()
+}
+
 /// The failed frames by reason, the most frequent first.
 pub(super) fn failures(frames: &[FrameRecord]) -> Vec<Failure> {
     let mut failures: Vec<Failure> = Vec::new();
@@ -106,6 +122,26 @@ pub(super) fn parameters<'a>(
         }
     }
     names
+}
+
+/// The parameters of which the trials have more than one value, or some none, and the others with
+/// their value.
+pub(super) fn varied(trials: &[Trial<'_>], parameters: &[String]) -> (Vec<String>, Vec<String>) {
+    let mut varied = Vec::new();
+    let mut constant = Vec::new();
+    for name in parameters {
+        let mut values = trials
+            .iter()
+            .map(|trial| value_of(&trial.frame.config, name));
+        let first = values.next().flatten();
+        match first {
+            Some(value) if values.all(|other| other == first) => {
+                constant.push(format!("{name} = {value}"));
+            }
+            _ => varied.push(name.clone()),
+        }
+    }
+    (varied, constant)
 }
 
 /// The value of a parameter.
@@ -171,6 +207,22 @@ mod tests {
     }
 
     #[test]
+    fn of_many_trials_the_best_and_some_others_are_kept() {
+        let run = example::run(3000);
+        let trials = measured(&run.frames);
+        let kept = thinned(&trials, 300);
+        assert!((270..=350).contains(&kept.len()), "{}", kept.len());
+        for trial in &trials {
+            let is_kept = kept.iter().any(|one| one.frame.frame == trial.frame.frame);
+            assert!(is_kept || (trial.rank > 0.0 && !trial.frame.is_incumbent));
+        }
+        assert_eq!(thinned(&trials[..10], 300).len(), 10);
+        // Equal costs are no reason to keep all.
+        let equal = with_costs(&[5.0; 1000]);
+        assert!(thinned(&measured(&equal), 100).len() <= 110);
+    }
+
+    #[test]
     fn every_frame_is_measured_or_failed() {
         let mut frames = example::run(80).frames;
         frames[3].cost_ms = Some(f64::NAN);
@@ -228,6 +280,21 @@ mod tests {
         assert_eq!(parameters(&configs), ["b", "a", "c"]);
         assert_eq!(value_of(&configs[0], "a"), Some("1"));
         assert_eq!(value_of(&configs[0], "c"), None);
+    }
+
+    #[test]
+    fn a_parameter_that_some_lack_is_varied() {
+        let mut frames = with_costs(&[1.0, 2.0]);
+        let config = |names: &[(&str, &str)]| -> Vec<(String, String)> {
+            let pair = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+            names.iter().map(pair).collect()
+        };
+        frames[0].config = config(&[("a", "1"), ("b", "1"), ("c", "1")]);
+        frames[1].config = config(&[("a", "1"), ("b", "2")]);
+        let names = ["a", "b", "c"].map(str::to_string);
+        let (some, others) = varied(&measured(&frames), &names);
+        assert_eq!(some, ["b", "c"]);
+        assert_eq!(others, ["a = 1"]);
     }
 
     #[test]

@@ -78,6 +78,22 @@ impl Axis {
         Axis::linear(0.0, high, 0.0)
     }
 
+    /// The logarithmic axis over whole decades around the positive ones of `values`.
+    pub(crate) fn decades(values: impl IntoIterator<Item = f64>) -> Axis {
+        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+        for value in values.into_iter().filter_map(plottable) {
+            if value > 0.0 {
+                (low, high) = (low.min(value), high.max(value));
+            }
+        }
+        if high == 0.0 {
+            (low, high) = (1.0, 1.0);
+        }
+        let first = low.log10().floor() as i32;
+        let last = (high.log10().ceil() as i32).max(first + 1);
+        Axis::logarithmic(10f64.powi(first), 10f64.powi(last))
+    }
+
     /// The same axis with ticks at `values`, in place of round numbers.
     pub(crate) fn with_ticks_at(mut self, ticks: Vec<Tick>) -> Axis {
         self.ticks = ticks;
@@ -228,6 +244,19 @@ mod tests {
 
     fn labels(axis: &Axis) -> Vec<&str> {
         axis.ticks.iter().map(|tick| tick.label.as_str()).collect()
+    }
+
+    #[test]
+    fn decades_are_whole_whatever_the_values() {
+        let axis = Axis::decades([0.3, 40.0, 0.0, -1.0, f64::NAN, f64::INFINITY]);
+        assert_eq!(axis.fraction(0.1), Some(0.0));
+        assert!((axis.fraction(10.0).unwrap() - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(axis.fraction(0.0), None);
+        for values in [vec![], vec![0.0], vec![1.0], vec![1e-150, 1e150]] {
+            let axis = Axis::decades(values.clone());
+            assert!(axis.low < axis.high && axis.high.is_finite(), "{values:?}");
+            assert!(axis.ticks().count() >= 2, "{values:?}");
+        }
     }
 
     #[test]

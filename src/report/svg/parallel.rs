@@ -6,15 +6,19 @@
 //! parameter passes below the axis. Poor with thousands of lines: what lies below is hidden.
 
 use super::axis::{Axis, Tick};
-use super::{Anchor, Area, LINE_HEIGHT, Size, color, drawing, line, path, text};
+use super::{Anchor, Area, LINE_HEIGHT, Size, color, drawing, line, path, text, text_width};
 use crate::report::markup::shorten;
 use crate::report::number;
 
 /// Least distance of two axes.
-const LEAST_DISTANCE: f64 = 84.0;
+const LEAST_DISTANCE: f64 = 74.0;
 const HEIGHT: f64 = 380.0;
 /// Names are cut beyond this: they stand in two rows, so that each may take two distances.
-const LONGEST_NAME: usize = 22;
+const LONGEST_NAME: usize = 20;
+/// Words at the ticks are cut beyond this.
+const LONGEST_WORD: usize = 14;
+/// Room beside the outermost axes for half a name.
+const LEAST_MARGIN: f64 = 65.0;
 /// Up to so many different numbers are marked each by a tick of its own.
 const FEW: usize = 7;
 /// Where values begin if the lowest place of the axis is taken by "absent".
@@ -38,19 +42,25 @@ pub(crate) fn parallel_coordinates(
     strands: &[Strand],
 ) -> String {
     let gaps = columns.len().saturating_sub(1) as f64;
-    let size = Size {
-        width: least_width.max(gaps * LEAST_DISTANCE + 130.0),
-        height: HEIGHT,
-    };
-    let area = Area {
-        left: 65.0,
-        top: 2.0 * LINE_HEIGHT + 16.0,
-        right: size.width - 65.0,
-        bottom: size.height - 14.0,
-    };
     let scales: Vec<Column<'_>> = (0..columns.len())
         .map(|column| Column::new(strands.iter().map(|strand| strand.value(column))))
         .collect();
+    // Labels stand to the left of their axis.
+    let labels = scales.first().map(Column::ticks).unwrap_or_default();
+    let left = labels
+        .iter()
+        .map(|(_, label)| text_width(label) + 12.0)
+        .fold(LEAST_MARGIN, f64::max);
+    let size = Size {
+        width: least_width.max(gaps * LEAST_DISTANCE + left + LEAST_MARGIN),
+        height: HEIGHT,
+    };
+    let area = Area {
+        left,
+        top: 2.0 * LINE_HEIGHT + 16.0,
+        right: size.width - LEAST_MARGIN,
+        bottom: size.height - 14.0,
+    };
     let x_of = |column: usize| {
         if gaps == 0.0 {
             area.x(0.5)
@@ -184,7 +194,7 @@ impl<'a> Column<'a> {
             ColumnScale::Words(words) => {
                 for &word in words {
                     if let Some(position) = self.fraction(Some(word)) {
-                        ticks.push((position, shorten(word, 10)));
+                        ticks.push((position, shorten(word, LONGEST_WORD)));
                     }
                 }
             }
@@ -322,6 +332,16 @@ mod tests {
                 "{drawn}"
             );
         }
+    }
+
+    #[test]
+    fn words_at_the_first_axis_are_not_cut_off() {
+        let strands = [strand(&["agglomerative", "1"], 0.0)];
+        let drawn = parallel_coordinates(600.0, "all", &names(2), &strands);
+        assert!(drawn.contains(">agglomerative<"));
+        let label = drawn.split("tick halo\" x=\"").nth(1).unwrap();
+        let end: f64 = label.split('"').next().unwrap().parse().unwrap();
+        assert!(end >= text_width("agglomerative"), "{end}");
     }
 
     #[test]

@@ -1,60 +1,17 @@
-//! Plots of two numeric axes: marks, step lines and levels over one another.
+//! Plots of two numeric axes: layers over one another.
 //!
 //! The axes are fitted to all layers together. What has no position, because it is not finite or
-//! not positive on a logarithmic axis, is left out. Marks are drawn in the order given: the last
-//! lies on top.
+//! not positive on a logarithmic axis, is left out. Layers and their marks are drawn in the order
+//! given: the last lies on top.
 
 use super::axis::Axis;
-use super::marker::Marker;
-use super::{Anchor, Area, LINE_HEIGHT, Size, drawing, line, path, text, text_width, upward_text};
+pub(crate) use super::layer::{Column, Interval, Layer, Mark};
+use super::layer::{Place, SYMBOL_WIDTH};
+use super::{Anchor, Area, LINE_HEIGHT, Size, drawing, line, text, text_width, upward_text};
 use crate::report::markup::shorten;
 
-/// Width of the symbol before a name in the legend.
-const SYMBOL_WIDTH: f64 = 26.0;
 /// Names in the legend are cut beyond this.
 const LONGEST_NAME: usize = 44;
-
-/// A value with its look.
-#[derive(Clone, Debug)]
-pub(crate) struct Mark {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
-    /// Class that gives the colour.
-    pub(crate) class: String,
-    /// Shown when the pointer rests on the mark.
-    pub(crate) title: String,
-}
-
-/// One kind of thing in a plot. The legend names what has a name and a value.
-#[derive(Clone, Debug)]
-pub(crate) enum Layer {
-    /// Separate values.
-    Marks {
-        name: String,
-        marker: Marker,
-        radius: f64,
-        marks: Vec<Mark>,
-    },
-    /// A value that holds until the next one: (x, y) in order of x. Extends to the end of the axis.
-    Steps {
-        name: String,
-        class: &'static str,
-        points: Vec<(f64, f64)>,
-    },
-    /// A value that holds everywhere, with its quartiles as a band.
-    Level {
-        name: String,
-        class: String,
-        y: f64,
-        band: (f64, f64),
-    },
-    /// Places that have an x but no y: crosses along the upper edge.
-    Absences {
-        name: String,
-        /// x and what the pointer shows.
-        places: Vec<(f64, String)>,
-    },
-}
 
 /// A plot before it is drawn.
 #[derive(Clone, Debug)]
@@ -66,14 +23,31 @@ pub(crate) struct Plot<'a> {
     pub(crate) x_label: &'a str,
     /// Quantity and unit.
     pub(crate) y_label: &'a str,
+    pub(crate) y_range: Range,
     pub(crate) layers: Vec<Layer>,
+}
+
+/// Which values an axis shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Range {
+    /// Those of the layers, on the scale that tells them apart best.
+    Fitted,
+    /// Zero to the largest value, or to this if that is less: columns beyond are cut.
+    FromZero(f64),
+    /// Whole decades.
+    Decades,
 }
 
 impl Plot<'_> {
     /// The plot as an SVG element.
     pub(crate) fn draw(&self) -> String {
         let x_axis = Axis::fitting(self.layers.iter().flat_map(Layer::x_values));
-        let y_axis = Axis::fitting(self.layers.iter().flat_map(Layer::y_values));
+        let y_values = self.layers.iter().flat_map(Layer::y_values);
+        let y_axis = match self.y_range {
+            Range::Fitted => Axis::fitting(y_values),
+            Range::FromZero(most) => Axis::from_zero(y_values.map(|y| (1.03 * y).min(most))),
+            Range::Decades => Axis::decades(y_values),
+        };
         let (legend, legend_height) = self.legend();
         let widest = y_axis
             .ticks()
@@ -87,8 +61,13 @@ impl Plot<'_> {
         };
         let mut content = legend;
         content.push_str(&self.axes(&area, &x_axis, &y_axis));
+        let place = Place {
+            area,
+            x_axis,
+            y_axis,
+        };
         for layer in &self.layers {
-            content.push_str(&layer.draw(&area, &x_axis, &y_axis));
+            content.push_str(&layer.draw(&place));
         }
         drawing(self.size, self.description, &content)
     }
@@ -152,123 +131,9 @@ impl Plot<'_> {
     }
 }
 
-impl Layer {
-    fn name(&self) -> &str {
-        match self {
-            Layer::Marks { name, .. }
-            | Layer::Steps { name, .. }
-            | Layer::Level { name, .. }
-            | Layer::Absences { name, .. } => name,
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.x_values().is_empty() && self.y_values().is_empty()
-    }
-
-    fn x_values(&self) -> Vec<f64> {
-        match self {
-            Layer::Marks { marks, .. } => marks.iter().map(|mark| mark.x).collect(),
-            Layer::Steps { points, .. } => points.iter().map(|point| point.0).collect(),
-            Layer::Level { .. } => Vec::new(),
-            Layer::Absences { places, .. } => places.iter().map(|place| place.0).collect(),
-        }
-    }
-
-    fn y_values(&self) -> Vec<f64> {
-        match self {
-            Layer::Marks { marks, .. } => marks.iter().map(|mark| mark.y).collect(),
-            Layer::Steps { points, .. } => points.iter().map(|point| point.1).collect(),
-            Layer::Level { y, band, .. } => vec![*y, band.0, band.1],
-            Layer::Absences { .. } => Vec::new(),
-        }
-    }
-
-    fn draw(&self, area: &Area, x_axis: &Axis, y_axis: &Axis) -> String {
-        let x_of = |value| x_axis.fraction(value).map(|position| area.x(position));
-        let y_of = |value| y_axis.fraction(value).map(|position| area.y(position));
-        match self {
-            Layer::Marks {
-                marker,
-                radius,
-                marks,
-                ..
-            } => marks
-                .iter()
-                .filter_map(|mark| {
-                    let (x, y) = (x_of(mark.x)?, y_of(mark.y)?);
-                    Some(marker.draw(&mark.class, x, y, *radius, &mark.title))
-                })
-                .collect(),
-            Layer::Steps { class, points, .. } => {
-                let mut corners: Vec<(f64, f64)> = Vec::new();
-                for &(x, y) in points {
-                    let (Some(x), Some(y)) = (x_of(x), y_of(y)) else {
-                        continue;
-                    };
-                    if let Some(&(_, before)) = corners.last() {
-                        corners.push((x, before));
-                    }
-                    corners.push((x, y));
-                }
-                let Some(&(_, last)) = corners.last() else {
-                    return String::new();
-                };
-                corners.push((area.right, last));
-                path(&format!("steps {class}"), &corners, self.name())
-            }
-            Layer::Level { class, y, band, .. } => {
-                let mut content = String::new();
-                if let (Some(below), Some(above)) = (y_of(band.0), y_of(band.1)) {
-                    content.push_str(&format!(
-                        "<rect class=\"band {class}\" x=\"{:.1}\" y=\"{above:.1}\" \
-                         width=\"{:.1}\" height=\"{:.1}\"/>\n",
-                        area.left,
-                        area.right - area.left,
-                        (below - above).max(0.0),
-                    ));
-                }
-                if let Some(y) = y_of(*y) {
-                    let class = format!("level {class}");
-                    content.push_str(&path(
-                        &class,
-                        &[(area.left, y), (area.right, y)],
-                        self.name(),
-                    ));
-                }
-                content
-            }
-            Layer::Absences { places, .. } => places
-                .iter()
-                .filter_map(|(x, title)| {
-                    Some(Marker::Cross.draw("bad", x_of(*x)?, area.top, 4.0, title))
-                })
-                .collect(),
-        }
-    }
-
-    /// What stands before the name in the legend, from `x` on and centred at `y`.
-    fn symbol(&self, x: f64, y: f64) -> String {
-        let middle = x + SYMBOL_WIDTH / 2.0 - 3.0;
-        let right = x + SYMBOL_WIDTH - 6.0;
-        match self {
-            Layer::Marks { marker, marks, .. } => {
-                let class = marks.first().map_or("plain", |mark| &mark.class);
-                marker.draw(class, middle, y, 4.5, "")
-            }
-            Layer::Steps { class, .. } => {
-                path(&format!("steps {class}"), &[(x, y), (right, y)], "")
-            }
-            Layer::Level { class, .. } => {
-                path(&format!("level {class}"), &[(x, y), (right, y)], "")
-            }
-            Layer::Absences { .. } => Marker::Cross.draw("bad", middle, y, 4.0, ""),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::marker::Marker;
     use super::*;
 
     fn plot(layers: Vec<Layer>) -> String {
@@ -280,6 +145,7 @@ mod tests {
             description: "a <plot>",
             x_label: "frame",
             y_label: "cost (ms)",
+            y_range: Range::Fitted,
             layers,
         }
         .draw()
@@ -402,6 +268,7 @@ mod tests {
                 description: "",
                 x_label: "",
                 y_label: "",
+                y_range: Range::Fitted,
                 layers,
             };
             plot.legend().1
