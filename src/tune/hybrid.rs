@@ -39,11 +39,11 @@ use frame::Frame;
 const LEAST_GAIN: f64 = 0.005;
 const QUIET_PROPOSALS: u32 = 5;
 
-/// Candidates in a row without a new incumbent after which nothing more is tried.
-const PATIENCE: u32 = 10;
+/// New candidates in a row without a new incumbent after which nothing more is tried.
+const PATIENCE: u32 = 12;
 
 /// Probes of a candidate that could not be told from the incumbent.
-const MOST_PROBES: u32 = 5;
+const MOST_PROBES: u32 = 3;
 
 /// Weight of the last frame in what a tile is expected to take.
 const FRESH: f64 = 0.2;

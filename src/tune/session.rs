@@ -41,6 +41,8 @@ pub enum TrialFailure {
     Build(BuildError),
     /// Rendering was given up.
     TooSlow,
+    /// The picture has too few tiles, or the clock is too coarse, to tell.
+    Unmeasured,
 }
 
 impl std::fmt::Display for TrialFailure {
@@ -51,6 +53,7 @@ impl std::fmt::Display for TrialFailure {
                 f,
                 "given up: over {SLOWEST_TRIAL} times slower than the default parameters"
             ),
+            Self::Unmeasured => f.write_str("not measured: too few tiles, or too coarse a clock"),
         }
     }
 }

@@ -4,16 +4,24 @@
 //! through; the clock is an argument.
 
 use std::{
+    num::NonZeroU32,
     sync::{Mutex, PoisonError},
     time::Duration,
 };
 
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
-use raywright_imaging::{Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop};
+use raywright_imaging::{
+    Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop,
+    tiles::DEFAULT_TILE_SIZE,
+};
 use raywright_tracer::{Integrator, Rgb, Shot, World};
 use raywright_tuner::TellError;
 
 use super::{metric::Metric, space::SpaceFault};
+
+/// Tiles of a frame that is to be compared tile by tile, and their smallest side, pixels.
+const MANY_TILES: f64 = 200.0;
+const SMALLEST_TILE: u32 = 4;
 
 /// Tells how much time has passed since some moment.
 pub trait Clock: Sync {
@@ -233,9 +241,19 @@ impl<'a, C: Clock> Stage<'a, C> {
         })
     }
 
+    /// Tiles of which there are enough to compare some with others, even in a small picture.
+    fn tile_loop(&self) -> TileLoop<'static> {
+        let area = f64::from(self.settings.width) * f64::from(self.settings.height);
+        let side = (area / MANY_TILES).sqrt() as u32;
+        let most = DEFAULT_TILE_SIZE.get();
+        let side = NonZeroU32::new(side.clamp(SMALLEST_TILE, most)).unwrap_or(DEFAULT_TILE_SIZE);
+        TileLoop::new().with_tile_size(side)
+    }
+
     /// The number of tiles of a frame.
     pub(super) fn tiles(&self) -> usize {
-        TileLoop::new().tiles(self.settings.width, self.settings.height)
+        self.tile_loop()
+            .tiles(self.settings.width, self.settings.height)
     }
 
     /// Adds one sample to every pixel of those tiles for which there is a tree; what a thread
@@ -253,7 +271,7 @@ impl<'a, C: Clock> Stage<'a, C> {
         let shot = self.shot();
         let times = Mutex::new(Vec::new());
         let begun = self.clock.now();
-        let completion = TileLoop::new().run(film, |tile, view| {
+        let completion = self.tile_loop().run(film, |tile, view| {
             let Some(tree) = tree_of(tile.index) else {
                 return;
             };

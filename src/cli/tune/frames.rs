@@ -75,7 +75,7 @@ impl Frames<'_> {
             Self::Tiles(hybrid) => {
                 let before = hybrid.incumbent();
                 let done = hybrid.frame_told(cancel, told)?;
-                done.map(|done| of_tiles(frame, before, &done, metric, reason))
+                done.map(|done| of_tiles(frame, before, &done, metric))
             }
         })
     }
@@ -112,13 +112,7 @@ impl Frames<'_> {
 }
 
 /// The record of a frame in which a candidate may have been tried on tiles.
-fn of_tiles(
-    frame: usize,
-    before: Option<BuildParams>,
-    done: &HybridFrame,
-    metric: Metric,
-    reason: Option<String>,
-) -> Done {
+fn of_tiles(frame: usize, before: Option<BuildParams>, done: &HybridFrame, metric: Metric) -> Done {
     let own = FrameTimes {
         build: done.build,
         render: done.time.saturating_sub(done.build),
@@ -155,7 +149,10 @@ fn of_tiles(
                 decision: probed.decision.name().into(),
             })
         }),
-        reason,
+        reason: done
+            .candidate
+            .as_ref()
+            .map(|candidate| candidate.reason.clone()),
     };
     let ended = match probed {
         Some(Ok(probed)) => Ok(probed.times),

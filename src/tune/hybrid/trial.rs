@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use raywright_bvh::{BuildParams, Bvh};
-use raywright_tuner::{ChangeDetector, Outcome, Trial};
+use raywright_tuner::{ChangeDetector, Outcome, Reason, Trial};
 
 use super::{Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, frame::Frame};
 use crate::tune::{
@@ -65,7 +65,8 @@ impl<C: Clock> Hybrid<'_, C> {
                 let costs = self.costs(incumbent, build);
                 let probe = self.probe(frame, [&incumbent.tree; 2], &costs, None)?;
                 self.trace_rest(frame, &incumbent.tree)?;
-                (self.own(frame, incumbent, probe, &costs), Duration::ZERO)
+                let outcome = probe.map(|probe| self.own(frame, incumbent, &probe, &costs));
+                (outcome, Duration::ZERO)
             }
             Ok(Some((tree, build))) => {
                 let outcome = self.beside(frame, incumbent, trial, params, tree, build)?;
@@ -85,7 +86,7 @@ impl<C: Clock> Hybrid<'_, C> {
         }
         match &outcome {
             Ok(probed) if probed.decision == Decision::Accepted => self.fruitless = 0,
-            _ if is_own => {}
+            _ if is_own || trial.reason == Reason::Replicate => {}
             _ => self.fruitless += 1,
         }
         if let Some((_, known)) = self.check.take()
@@ -95,7 +96,11 @@ impl<C: Clock> Hybrid<'_, C> {
         }
         let candidate = Candidate {
             params,
-            reason: trial.reason.to_string(),
+            reason: if is_own {
+                "incumbent".into()
+            } else {
+                trial.reason.to_string()
+            },
             outcome,
         };
         Ok(Some((candidate, build)))
@@ -116,21 +121,20 @@ impl<C: Clock> Hybrid<'_, C> {
         &self,
         frame: &mut Frame<'_>,
         incumbent: &Incumbent,
-        probe: Option<Probe>,
+        probe: &Probe,
         costs: &Costs,
-    ) -> Result<Probed, TrialFailure> {
-        let probe = probe.ok_or(TrialFailure::TooSlow)?;
+    ) -> Probed {
         frame.times.extend(&probe.candidate_times);
         frame.times.extend(&probe.incumbent_times);
         let cost = self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp());
-        Ok(Probed {
+        Probed {
             times: times(incumbent.build(), costs, probe.ratio),
             ratio: probe.ratio,
             cost_ratio: costs.bounds(probe.ratio),
             cost,
             share: 0.0,
             decision: Decision::Undecided,
-        })
+        }
     }
 
     /// Another tree beside the incumbent's, in whose place it comes if it is better.
@@ -151,11 +155,14 @@ impl<C: Clock> Hybrid<'_, C> {
         let trees = [&tree, &incumbent.tree];
         let probe = self.probe(frame, trees, &costs, before.map(|known| known.0))?;
         let is_accepted =
-            !is_check && (probe.as_ref()).is_some_and(|probe| probe.decision == Decision::Accepted);
+            !is_check && (probe.as_ref()).is_ok_and(|probe| probe.decision == Decision::Accepted);
         self.trace_rest(frame, if is_accepted { &tree } else { &incumbent.tree })?;
-        let Some(probe) = probe else {
-            self.stage.recycle(tree);
-            return Ok(Err(TrialFailure::TooSlow));
+        let probe = match probe {
+            Ok(probe) => probe,
+            Err(failure) => {
+                self.stage.recycle(tree);
+                return Ok(Err(failure));
+            }
         };
         let share = probe.candidate_times.len() as f64 / self.tiles.len() as f64;
         let other_share = probe.incumbent_times.len() as f64 / self.tiles.len() as f64;
@@ -206,20 +213,20 @@ impl<C: Clock> Hybrid<'_, C> {
     }
 
     /// Traces tiles through the trees of candidate and incumbent until one is seen to be better, or half of
-    /// the frame is done with either. `None` if nothing could be measured.
+    /// the frame is done with either.
     fn probe(
         &self,
         frame: &mut Frame<'_>,
         [candidate, incumbent]: [&Bvh; 2],
         costs: &Costs,
         before: Option<ProbeRatio>,
-    ) -> Result<Option<Probe>, SessionError> {
+    ) -> Result<Result<Probe, TrialFailure>, SessionError> {
         let order = spread_order(self.tiles.len(), frame.sample);
         let limit = Duration::try_from_secs_f64(SLOWEST_PART * costs.render);
         let limit = limit.unwrap_or(Duration::MAX);
         let mut pairs: Vec<Pair> = Vec::new();
         let (mut candidate_times, mut incumbent_times) = (Vec::new(), Vec::new());
-        let mut found = None;
+        let mut found = Err(TrialFailure::Unmeasured);
         let mut begin = 0;
         for share in SHARES {
             let end = 2 * ((share * order.len() as f64) as usize).min(order.len() / 2);
@@ -247,18 +254,23 @@ impl<C: Clock> Hybrid<'_, C> {
                     });
                 }
             }
-            let Some(ratio) = ProbeRatio::of(&pairs) else {
-                continue;
-            };
-            let all = before.map_or(ratio, |before| before.and(ratio));
-            let decision = costs.decide(all);
-            found = Some((ratio, all, decision));
-            if decision != Decision::Undecided || times.len() < part.len() {
+            let is_late = times.len() < part.len();
+            if let Some(ratio) = ProbeRatio::of(&pairs) {
+                let all = before.map_or(ratio, |before| before.and(ratio));
+                let decision = costs.decide(all);
+                found = Ok((ratio, all, decision));
+                if decision != Decision::Undecided {
+                    break;
+                }
+            } else if is_late {
+                found = Err(TrialFailure::TooSlow);
+            }
+            if is_late {
                 break;
             }
         }
         // What was traced in vain is the incumbent's all the same.
-        if found.is_none() {
+        if found.is_err() {
             frame.times.extend(&incumbent_times);
         }
         Ok(found.map(|(ratio, all, decision)| Probe {
