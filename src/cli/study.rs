@@ -1,7 +1,9 @@
 //! `raywright study`: measurements that are kept as data.
 //!
 //! `record` appends one row per configuration and camera as soon as it is there; a table that has rows
-//! already is gone on with, so that a recording can be stopped at any moment.
+//! already is gone on with, so that a recording can be stopped at any moment. `gains` has a file of its own.
+
+mod gains;
 
 use std::{
     collections::{BTreeMap, HashSet},
@@ -33,6 +35,8 @@ use super::{
 pub(crate) enum StudyCommand {
     /// Record what many configurations take in a scene: one row per configuration and camera
     Record(RecordArgs),
+    /// What tuning gains on the default parameters, by real frames of several scenes and seeds
+    Gains(gains::GainsArgs),
 }
 
 #[derive(Debug, Args)]
@@ -76,6 +80,7 @@ pub(crate) fn run(command: &StudyCommand) -> Result<(), Failure> {
     let cancel = cancel_on_interrupt()?;
     match command {
         StudyCommand::Record(args) => args.run.install(|| record(args, &cancel)),
+        StudyCommand::Gains(args) => args.run.install(|| gains::run(args, &cancel)),
     }
 }
 

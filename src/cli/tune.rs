@@ -89,6 +89,8 @@ enum Space {
     Printed,
     /// Only what builds different trees, near trees near to each other
     Canonical,
+    /// The same of the paper's eleven parameters alone
+    Eleven,
 }
 
 impl From<Space> for SpaceAxes {
@@ -96,6 +98,7 @@ impl From<Space> for SpaceAxes {
         match space {
             Space::Printed => Self::Printed,
             Space::Canonical => Self::Canonical,
+            Space::Eleven => Self::Eleven,
         }
     }
 }

@@ -24,6 +24,10 @@ const MOST_COST_RATIO: f64 = 64.0;
 /// Larger leaves are not searched, whatever the smallest.
 const MOST_LEAF: u32 = 32;
 
+/// What the paper has not: parameters, and among qualities all but these.
+pub(super) const OURS: &[&str] = &["split_budget", "rounding", "rotations"];
+pub(super) const PAPER_QUALITIES: &[&str] = &["morton", "binned-sah", "spatial-splits"];
+
 /// The axis that stands for a parameter of the table; `None`: the usual one.
 pub(super) fn axis(parameter: &Parameter, is_searched: impl Fn(&str) -> bool) -> Option<Axis> {
     let doc = parameter.meaning;

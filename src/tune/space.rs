@@ -41,6 +41,8 @@ pub enum SpaceAxes {
     Printed,
     /// What builds the same tree is one point, and what a builder does not read is no axis.
     Canonical,
+    /// The same of the eleven parameters of the paper and their ranges alone.
+    Eleven,
 }
 
 /// A search space over some of the BVH parameters; the others stay as given.
@@ -57,13 +59,16 @@ impl ParameterSpace {
     /// If `base` is not valid or nothing is left to search.
     pub fn new(base: &BuildParams, fixed: &[&str], axes: SpaceAxes) -> Result<Self, SpaceFault> {
         base.validate().map_err(SpaceFault::Fixed)?;
-        let searched = |name: &str| !fixed.contains(&name);
+        let is_given = |name: &str| axes == SpaceAxes::Eleven && canonical::OURS.contains(&name);
+        let searched = |name: &str| !fixed.contains(&name) && !is_given(name);
         let params = PARAMETERS
             .iter()
             .filter(|p| !p.changes_hits && searched(p.name));
         let params: Vec<Param> = match axes {
             SpaceAxes::Printed => params.filter_map(param_of).collect(),
-            SpaceAxes::Canonical => params.filter_map(|p| canonical_of(p, searched)).collect(),
+            SpaceAxes::Canonical | SpaceAxes::Eleven => params
+                .filter_map(|p| canonical_of(p, searched, axes == SpaceAxes::Eleven))
+                .collect(),
         };
         let mut space = Space::new(params).map_err(SpaceFault::Space)?;
         let has = |space: &Space, name: &str| space.params().iter().any(|p| p.name == name);
@@ -199,23 +204,38 @@ fn param_of(parameter: &Parameter) -> Option<Param> {
 }
 
 /// The canonical axis of a parameter, active where a builder reads it.
-fn canonical_of(parameter: &Parameter, searched: impl Fn(&str) -> bool) -> Option<Param> {
-    let param = match canonical::axis(parameter, &searched) {
+fn canonical_of(
+    parameter: &Parameter,
+    searched: impl Fn(&str) -> bool,
+    eleven: bool,
+) -> Option<Param> {
+    let qualities = word_values("quality").unwrap_or_default();
+    let is_quality = |word: &str| !eleven || canonical::PAPER_QUALITIES.contains(&word);
+    let indices = |wanted: &dyn Fn(&str) -> bool| -> Vec<i64> {
+        let words = (0..).zip(qualities);
+        words
+            .filter(|(_, word)| is_quality(word) && wanted(word))
+            .map(|(index, _)| index)
+            .collect()
+    };
+    if eleven && parameter.name == "quality" {
+        let doc = parameter.meaning;
+        return Some(Param::ordinal(parameter.name, indices(&|_| true), doc));
+    }
+    let axis = match parameter.name {
+        // As in the table: nodes of 16 are ours.
+        "branching_factor" if eleven => None,
+        _ => canonical::axis(parameter, &searched),
+    };
+    let param = match axis {
         Some(Axis::Instead(param)) => param,
         Some(Axis::None) => return None,
         None => param_of(parameter)?,
     };
     let readers = canonical::readers(parameter.name).filter(|_| searched("quality"));
-    let words = word_values("quality").unwrap_or_default();
     Some(match readers {
         None => param,
-        Some(readers) => {
-            let indices = (0..).zip(words).filter(|(_, word)| readers.contains(word));
-            param.active_if(
-                "quality",
-                indices.map(|(index, _)| index).collect::<Vec<i64>>(),
-            )
-        }
+        Some(readers) => param.active_if("quality", indices(&|word| readers.contains(&word))),
     })
 }
 
@@ -232,10 +252,11 @@ pub fn described(params: &BuildParams) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raywright_bvh::Quality;
 
     #[test]
     fn every_configuration_is_valid_and_min_is_at_most_max() {
-        for axes in [SpaceAxes::Printed, SpaceAxes::Canonical] {
+        for axes in [SpaceAxes::Printed, SpaceAxes::Canonical, SpaceAxes::Eleven] {
             check_configurations(axes);
         }
     }
@@ -251,13 +272,23 @@ mod tests {
             let params = space.params(&space.space().decode(&unit));
             assert_eq!(params.validate(), Ok(()));
             assert!(params.min_leaf_size <= params.max_leaf_size);
+            if axes == SpaceAxes::Eleven {
+                assert!(params.branching_factor <= 8);
+                assert!(!matches!(
+                    params.quality,
+                    Quality::Agglomerative | Quality::Optimized
+                ));
+                let base = BuildParams::default();
+                assert_eq!(params.rotations, base.rotations);
+                assert_eq!(params.split_budget, base.split_budget);
+            }
         }
     }
 
     #[test]
     fn good_parameters_have_their_place_in_every_space() {
         let mut splits = BuildParams::default();
-        splits.quality = raywright_bvh::Quality::SpatialSplits;
+        splits.quality = Quality::SpatialSplits;
         splits.max_depth = 13;
         splits.min_leaf_size = 10;
         for axes in [SpaceAxes::Printed, SpaceAxes::Canonical] {
