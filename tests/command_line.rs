@@ -385,6 +385,53 @@ fn a_fixed_parameter_is_not_searched() {
     }
 }
 
+/// A policy is in the log, with what it did.
+#[test]
+fn policies_use_frames_in_their_own_way() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |policy: &str| -> Value {
+        let args = [
+            "tune",
+            "interior",
+            "--json",
+            "--policy",
+            policy,
+            "--width",
+            "64",
+            "--height",
+            "48",
+            "--frames",
+            "6",
+            "--rounds",
+            "1",
+            "--frames-per-tree",
+            "3",
+        ];
+        let output = raywright(folder.path(), &args);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let run: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        assert_eq!(run["header"]["policy"], policy);
+        assert_eq!(run["header"]["frames_per_tree"], 3.0);
+        assert_eq!(run["frames"].as_array().map(Vec::len), Some(6));
+        run
+    };
+    let probes = |run: &Value| {
+        let frames = run["frames"].as_array().expect("frames").iter();
+        frames.filter(|frame| frame["probe"].is_object()).count()
+    };
+    let hybrid = run("hybrid");
+    assert!(probes(&hybrid) >= 3, "{hybrid}");
+    let [paper, default] = ["paper", "default"].map(run);
+    assert_eq!((probes(&paper), probes(&default)), (0, 0));
+    let configs: Vec<&Value> = default["frames"]
+        .as_array()
+        .expect("frames")
+        .iter()
+        .map(|frame| &frame["config"])
+        .collect();
+    assert!(configs.iter().all(|config| *config == configs[0]));
+}
+
 /// Ctrl-C keeps what is done: a log of whole lines, a page, a picture, exit code 130.
 #[cfg(unix)]
 #[test]

@@ -93,7 +93,7 @@ fn a_store_is_listed_checked_merged_and_exported() {
 #[test]
 fn what_is_no_store_is_refused_and_not_made() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["list", "fsck", "compact", "export"] {
+    for command in ["list", "best", "fsck", "compact", "export"] {
         assert_eq!(store(folder.path(), &[command, "missing"]).0, Some(2));
     }
     assert_eq!(
@@ -144,4 +144,34 @@ fn a_run_goes_on_from_what_earlier_ones_found() {
         "{text}"
     );
     assert_eq!(store(folder.path(), &["fsck", "memory"]).0, Some(0));
+}
+
+#[test]
+fn a_run_on_tiles_remembers_what_it_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
+            .args(["tune", "interior", "--frames", "5", "--rounds", "1"])
+            .args(["--width", "64", "--height", "48", "--store", "memory"])
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .expect("the binary runs");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{errors}");
+        errors
+    };
+    assert!(!run(&[]).contains("earlier runs"));
+    // The first frame and four candidates, for whatever metric and whichever policy has the space.
+    assert!(run(&["--metric", "render"]).contains("5 outcomes of earlier runs are known"));
+    let paper = ["--policy", "paper", "--space", "canonical"];
+    assert!(run(&paper).contains("10 outcomes of earlier runs are known"));
+    let (code, text) = store(folder.path(), &["best", "memory", "--metric", "render"]);
+    assert_eq!(code, Some(0));
+    assert!(
+        text.contains("interior (64×48") && text.contains("ms over"),
+        "{text}"
+    );
+    let other = ["--policy", "paper"];
+    assert!(!run(&other).contains("earlier runs"));
 }

@@ -1,4 +1,5 @@
-//! `raywright study record`: rows that say what they mean, stopped and gone on with.
+//! `raywright study record`: rows that say what they mean, stopped and gone on with; `study gains`: a row for
+//! each run, and goals.
 
 #![cfg(feature = "cli")]
 
@@ -81,4 +82,39 @@ fn a_recording_is_stopped_and_gone_on_with() {
     fs::write(&path, "something else\n").unwrap();
     let (code, text) = at(&cameras);
     assert!(code == Some(2) && text.contains("another table"), "{text}");
+}
+
+#[test]
+fn gains_have_a_row_for_each_run_and_goals() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
+        .args([
+            "study", "gains", "interior", "--seeds", "3,4", "--frames", "4",
+        ])
+        .args(["--rounds", "2", "--width", "40", "--height", "30"])
+        .args(["--metrics", "render,total", "--spaces", "eleven,wide"])
+        .current_dir(folder.path())
+        .output()
+        .expect("the binary runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}");
+    assert!(
+        text.contains("goals: ") && text.contains(" of 15 met"),
+        "{text}"
+    );
+    let csv = fs::read_to_string(folder.path().join("gains.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 1 + 2 * 2 * 2);
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+    for row in &rows[1..] {
+        // Three frames of four are trials; the ratios are those of frames, whatever they are.
+        assert_eq!((row[0], row[4]), ("interior", "3"));
+        assert!(
+            row[6..9]
+                .iter()
+                .all(|ratio| ratio.parse::<f64>().unwrap() > 0.0)
+        );
+        let is_eleven = row[2] == "eleven";
+        assert!(!is_eleven || !row[11].contains("optimized"), "{row:?}");
+    }
 }

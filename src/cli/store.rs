@@ -3,18 +3,24 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
+    num::NonZeroU32,
     path::PathBuf,
 };
 
 use clap::{Args, Subcommand, ValueEnum};
-use raywright::tuner::store::{Changed, DamagePlace, Store, kind_name};
+use raywright::{
+    tune::Memory,
+    tuner::store::{Changed, DamagePlace, Facts, Store, kind_name},
+};
 
-use super::{Failure, memory::now, output};
+use super::{Failure, memory::now, output, tune::MetricOption};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum StoreCommand {
     /// Count what there is: records by kind, outcomes by machine and scene
     List(Folder),
+    /// The best configuration of each machine, scene and space
+    Best(BestOptions),
     /// Look for damage; exit code 1 if there is any
     Fsck(Folder),
     /// Add the records of other stores; those that are there already are no second time
@@ -29,6 +35,18 @@ pub(crate) enum StoreCommand {
 pub(crate) struct Folder {
     /// The folder of the store
     store: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BestOptions {
+    /// The folder of the store
+    store: PathBuf,
+    /// What is to be small
+    #[arg(long, value_enum, default_value_t = MetricOption::Total)]
+    metric: MetricOption,
+    /// Frames that a tree serves, with the metric total
+    #[arg(long, default_value_t = NonZeroU32::MIN)]
+    frames_per_tree: NonZeroU32,
 }
 
 #[derive(Debug, Args)]
@@ -64,6 +82,7 @@ pub(crate) struct Export {
 pub(crate) fn run(command: &StoreCommand) -> Result<(), Failure> {
     match command {
         StoreCommand::List(folder) => list(&opened(&folder.store)?),
+        StoreCommand::Best(options) => best(options),
         StoreCommand::Fsck(folder) => fsck(&opened(&folder.store)?),
         StoreCommand::Merge(merge) => {
             let from = merge
@@ -136,6 +155,47 @@ fn list(store: &Store) -> Result<(), Failure> {
     }
     for (scene, count) in &stats.by_scene {
         output::line(format_args!("scene {}: {count} outcomes", scene.as_str()))?;
+    }
+    Ok(())
+}
+
+/// A paragraph for each machine, scene and space.
+fn best(options: &BestOptions) -> Result<(), Failure> {
+    let records = opened(&options.store)?.read()?.records;
+    let metric = options.metric.metric(options.frames_per_tree);
+    let all = records.best(|outcome| Memory::cost(outcome, metric));
+    if all.is_empty() {
+        output::note("nothing was measured");
+    }
+    for best in all {
+        let fact = |facts: Option<&Facts>, name: &str| -> String {
+            facts
+                .and_then(|facts| facts.get(name))
+                .map_or_else(|| "?".into(), ToString::to_string)
+        };
+        let scene = records.scene(&best.scene).map(|scene| &scene.facts);
+        let machine = records.machine(&best.machine).map(|machine| &machine.facts);
+        output::line(format_args!(
+            "{} ({}×{}, K = {}) on {}, {} threads, {}",
+            fact(scene, "name"),
+            fact(scene, "width"),
+            fact(scene, "height"),
+            fact(scene, "path_length"),
+            fact(machine, "processor"),
+            fact(machine, "threads"),
+            fact(machine, "instruction_set"),
+        ))?;
+        output::line(format_args!(
+            "  {:.2} ms over {} trials, the best of {} configurations (space {})",
+            best.cost * 1e3,
+            best.n,
+            best.of,
+            best.space.as_str()
+        ))?;
+        let values: Vec<String> = (best.config.iter())
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
+        output::line(format_args!("  {}", values.join(" ")))?;
     }
     Ok(())
 }

@@ -41,11 +41,21 @@ use super::{
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MetricOption {
+pub(super) enum MetricOption {
     /// Time to render: the tree serves many frames
     Render,
     /// Time to build and render: the tree is built for each frame
     Total,
+}
+
+impl MetricOption {
+    /// The metric, for trees that serve so many frames in the total.
+    pub(super) fn metric(self, frames_per_tree: NonZeroU32) -> Metric {
+        match self {
+            Self::Render => Metric::Render,
+            Self::Total => Metric::of_frames_per_tree(frames_per_tree),
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -219,10 +229,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
         width: args.width,
         height: args.height,
         path_length: args.path_length,
-        metric: match args.metric {
-            MetricOption::Render => Metric::Render,
-            MetricOption::Total => Metric::of_frames_per_tree(args.frames_per_tree),
-        },
+        metric: args.metric.metric(args.frames_per_tree),
         seed: args.seed,
         isa: args.run.isa(),
     };

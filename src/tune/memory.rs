@@ -79,22 +79,23 @@ impl Memory {
         let mut known = Vec::new();
         for measured in self.records.outcomes(&query) {
             let outcome = match &measured.outcome.outcome {
-                Outcome::Done { .. } => {
-                    let [Some(&build), Some(&render)] =
-                        MEASURES.map(|name| measured.outcome.measures.get(name))
-                    else {
-                        continue;
-                    };
-                    Outcome::Done {
-                        cost: metric.cost(build, render),
-                    }
-                }
+                Outcome::Done { .. } => match Self::cost(measured.outcome, metric) {
+                    Some(cost) => Outcome::Done { cost },
+                    None => continue,
+                },
                 Outcome::Cancelled => continue,
                 failed => failed.clone(),
             };
             known.push((measured.trial.config_in(space)?, outcome));
         }
         Ok(known)
+    }
+
+    /// What an outcome of such a run costs by `metric`, in seconds; `None` if it does not tell.
+    #[must_use]
+    pub fn cost(outcome: &TrialOutcome, metric: Metric) -> Option<f64> {
+        let [build, render] = MEASURES.map(|name| outcome.measures.get(name).copied());
+        Some(metric.cost(build?, render?))
     }
 
     /// Notes that a trial begins at `time`, seconds since 1970; it is on the disk when this returns, if

@@ -4,6 +4,7 @@
 //! record whose fields do not have the expected form becomes [`Body::Other`], not an error.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,17 @@ pub enum Fact {
     Real(f64),
     /// A name.
     Text(String),
+}
+
+impl fmt::Display for Fact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Fact::Bool(value) => value.fmt(f),
+            Fact::Integer(value) => value.fmt(f),
+            Fact::Real(value) => value.fmt(f),
+            Fact::Text(value) => value.fmt(f),
+        }
+    }
 }
 
 impl From<&str> for Fact {

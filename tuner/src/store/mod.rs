@@ -49,6 +49,7 @@
 //! ```
 
 mod alias;
+mod best;
 mod body;
 mod entry;
 mod error;
@@ -64,6 +65,7 @@ mod report;
 mod space;
 mod writer;
 
+pub use best::Best;
 pub use body::{
     Alias, AliasOf, Body, Fact, Facts, Fields, Json, Machine, Note, Scene, State, TrialOpen,
     TrialOutcome,

@@ -151,3 +151,47 @@ fn export_is_a_table_and_lines() {
         ["trial-open", "outcome", "trial-open", "outcome", "note"]
     );
 }
+
+#[test]
+fn the_best_has_the_least_mean_and_no_failure() {
+    let (_folder, store) = store();
+    let (here, there) = (machine("here"), machine("there"));
+    let mut log = writer(&store, "a");
+    let mut told = |machine, size, outcome: Outcome| {
+        let (own_space, own_scene) = (SpaceFacts::new(&space()).id, scene("hall").id);
+        let open = TrialOpen::new(own_space, machine, own_scene, &config(size), "test");
+        let stamp = log.append(0.0, open).unwrap();
+        log.append(1.0, TrialOutcome::new(stamp, outcome)).unwrap();
+    };
+    let done = |cost| Outcome::Done { cost };
+    let failed = || Outcome::Failed {
+        reason: "too deep".into(),
+    };
+    for (size, outcome) in [
+        (2, done(1.0)),
+        (2, done(4.0)),
+        (4, done(2.0)),
+        (6, done(0.5)),
+        (6, failed()),
+        (8, Outcome::Cancelled),
+    ] {
+        told(here.id.clone(), size, outcome);
+    }
+    told(there.id.clone(), 8, done(9.0));
+    let cost = |outcome: &TrialOutcome| match outcome.outcome {
+        Outcome::Done { cost } => Some(cost),
+        _ => None,
+    };
+    let mut best = store.read().unwrap().records.best(cost);
+    best.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    assert_eq!(best.len(), 2);
+    let size = |index: usize| best[index].config["bins"].to_string();
+    assert_eq!(
+        (best[0].machine.clone(), best[0].cost, best[0].n, best[0].of),
+        (here.id, 2.0, 1, 3)
+    );
+    assert_eq!((size(0), size(1)), ("4".into(), "8".into()));
+    assert_eq!((best[1].machine.clone(), best[1].cost), (there.id, 9.0));
+    let nothing = store.read().unwrap().records.best(|_| None);
+    assert!(nothing.is_empty());
+}
