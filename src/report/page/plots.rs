@@ -1,6 +1,6 @@
 //! The plots of the page: from frames and comparison to layers and colours.
 
-use super::trials::{Trial, quarters, value_of};
+use super::trials::{Trial, quarters, tried, value_of};
 use crate::report::number;
 use crate::report::record::{ComparisonRow, FrameRecord};
 use crate::report::svg::bars::{Bar, bars};
@@ -94,8 +94,7 @@ pub(super) fn history(
         radius: 4.5,
         marks: marks(true, "incumbent"),
     });
-    let failed: Vec<&FrameRecord> = frames
-        .iter()
+    let failed: Vec<&FrameRecord> = tried(frames)
         .filter(|frame| frame.cost_ms.is_none_or(|cost| !cost.is_finite()))
         .collect();
     let stride = failed.len().div_ceil(MOST_CROSSES).max(1);

@@ -1,8 +1,11 @@
 //! What the frames of a run say, sorted for the page: what was measured, what failed, what was best.
 //!
-//! A frame counts as measured if its cost is a finite number, and as failed otherwise: every frame
-//! is one or the other, so nothing is lost between the tables.
+//! A frame in which something was tried counts as measured if its cost is a finite number, and as
+//! failed otherwise: it is one or the other, so nothing is lost between the tables. A frame of the
+//! incumbent alone is neither, whatever it took: a run that has found its best would be hundreds of
+//! times the same trial.
 
+use super::frames::Kind;
 use crate::report::record::FrameRecord;
 
 /// A measured frame.
@@ -31,12 +34,18 @@ pub(super) struct Failure {
     pub(super) frames: Vec<usize>,
 }
 
+/// The frames in which something was tried.
+pub(super) fn tried(frames: &[FrameRecord]) -> impl Iterator<Item = &FrameRecord> {
+    frames
+        .iter()
+        .filter(|frame| Kind::of(frame) != Kind::Incumbent)
+}
+
 /// The measured frames in their order.
 pub(super) fn measured(frames: &[FrameRecord]) -> Vec<Trial<'_>> {
     let costs = sorted_costs(frames);
     let others = costs.len().saturating_sub(1).max(1) as f64;
-    frames
-        .iter()
+    tried(frames)
         .filter_map(|frame| {
             let cost_ms = finite_cost(frame)?;
             let lower = costs.partition_point(|&cost| cost < cost_ms);
@@ -68,7 +77,7 @@ pub(super) fn thinned<'a>(trials: &[Trial<'a>], limit: usize) -> Vec<Trial<'a>> 
 /// The failed frames by reason, the most frequent first.
 pub(super) fn failures(frames: &[FrameRecord]) -> Vec<Failure> {
     let mut failures: Vec<Failure> = Vec::new();
-    for frame in frames.iter().filter(|frame| finite_cost(frame).is_none()) {
+    for frame in tried(frames).filter(|frame| finite_cost(frame).is_none()) {
         let reason = match (&frame.failure, frame.cost_ms) {
             (Some(reason), _) => reason.as_str(),
             (None, Some(_)) => "the cost is not a finite number",
@@ -170,7 +179,7 @@ fn finite_cost(frame: &FrameRecord) -> Option<f64> {
 }
 
 fn sorted_costs(frames: &[FrameRecord]) -> Vec<f64> {
-    let mut costs: Vec<f64> = frames.iter().filter_map(finite_cost).collect();
+    let mut costs: Vec<f64> = tried(frames).filter_map(finite_cost).collect();
     costs.sort_by(f64::total_cmp);
     costs
 }
@@ -233,6 +242,19 @@ mod tests {
             .sum();
         assert_eq!(measured(&frames).len() + failed, frames.len());
         assert!(measured(&frames).iter().all(|trial| trial.rank <= 1.0));
+    }
+
+    #[test]
+    fn a_frame_of_the_incumbent_alone_is_no_trial() {
+        let mut frames = with_costs(&[3.0, 1.0, 2.0]);
+        frames[1].frame_ms = Some(1.0);
+        let of = |frames: &[FrameRecord]| (measured(frames).len(), failures(frames).len());
+        assert_eq!(of(&frames), (2, 0));
+        frames[1].cost_ms = None;
+        assert_eq!(of(&frames), (2, 0));
+        assert_eq!(quarters(&frames)[0], 2.0);
+        frames[1].reason = Some("start".to_string());
+        assert_eq!(of(&frames), (2, 1));
     }
 
     #[test]
