@@ -125,7 +125,8 @@ pub(crate) fn probed(frames: usize) -> RunRecord {
     run
 }
 
-fn probe(share: f64, pairs: usize, ratio: f64, decision: &str) -> ProbeRecord {
+/// A probe with the bounds that so many pairs have.
+pub(crate) fn probe(share: f64, pairs: usize, ratio: f64, decision: &str) -> ProbeRecord {
     let deviation = if pairs < 5 {
         f64::INFINITY
     } else {

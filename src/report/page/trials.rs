@@ -5,7 +5,7 @@
 //! incumbent alone is neither, whatever it took: a run that has found its best would be hundreds of
 //! times the same trial.
 
-use super::frames::Kind;
+use super::frames::{Kind, build_part_ms, whole_ms};
 use crate::report::record::FrameRecord;
 
 /// A measured frame.
@@ -72,6 +72,18 @@ pub(super) fn thinned<'a>(trials: &[Trial<'a>], limit: usize) -> Vec<Trial<'a>> 
         index % stride == 0 || trial.cost_ms < good || trial.frame.is_incumbent
     });
     kept.map(|(_, trial)| *trial).collect()
+}
+
+/// Time to render a frame with the configuration that was tried. A frame with a probe was rendered with
+/// two: of R, what it takes with the incumbent, it took R (1 − s + s r), and the candidate takes R r.
+pub(super) fn render_ms(frame: &FrameRecord) -> Option<f64> {
+    let of_the_candidate = || {
+        let probe = frame.probe.as_ref()?;
+        let rendering = whole_ms(frame)? - build_part_ms(frame);
+        let time = rendering * probe.ratio / (1.0 + probe.share * (probe.ratio - 1.0));
+        (time.is_finite() && time >= 0.0).then_some(time)
+    };
+    of_the_candidate().or(frame.render_ms)
 }
 
 /// The failed frames by reason, the most frequent first.
@@ -255,6 +267,22 @@ mod tests {
         assert_eq!(quarters(&frames)[0], 2.0);
         frames[1].reason = Some("start".to_string());
         assert_eq!(of(&frames), (2, 1));
+    }
+
+    #[test]
+    fn the_time_of_a_candidate_is_found_from_a_part_of_the_frame() {
+        let mut frame = FrameRecord {
+            build_ms: Some(5.0),
+            render_ms: Some(110.0),
+            frame_ms: Some(115.0),
+            ..example::frame(0)
+        };
+        assert_eq!(render_ms(&frame), Some(110.0));
+        // A fifth of the tiles with half as much again: 110 instead of 100.
+        frame.probe = Some(example::probe(0.2, 30, 1.5, "rejected"));
+        assert!((render_ms(&frame).unwrap() - 150.0).abs() < 1e-9);
+        frame.probe.as_mut().unwrap().ratio = f64::NAN;
+        assert_eq!(render_ms(&frame), Some(110.0));
     }
 
     #[test]
