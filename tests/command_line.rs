@@ -360,6 +360,8 @@ fn a_fixed_parameter_is_not_searched() {
             &[
                 "tune",
                 "interior",
+                "--policy",
+                "paper",
                 "--json",
                 "-D",
                 "branching_factor=4",

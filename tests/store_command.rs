@@ -107,6 +107,7 @@ fn what_is_no_store_is_refused_and_not_made() {
 fn tune(folder: &Path, args: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
         .args(["tune", "interior", "--frames", "4", "--rounds", "1"])
+        .args(["--policy", "paper"])
         .args(["--width", "48", "--height", "27", "--store", "memory"])
         .args(args)
         .current_dir(folder)

@@ -9,5 +9,6 @@
 pub mod clock;
 pub mod goals;
 pub mod rays;
+pub mod recordings;
 pub mod scenes;
 pub mod turns;

@@ -26,22 +26,27 @@ struct Cameras {
     scenes: HashMap<String, SceneCameras>,
 }
 
-#[derive(Deserialize)]
-struct SceneCameras {
-    cameras: Vec<CameraLine>,
+/// What a file of cameras says of a scene; some say less.
+#[derive(Debug, Deserialize)]
+pub(crate) struct SceneCameras {
+    pub(crate) triangles: Option<f64>,
+    pub(crate) bounds_min: Option<[f64; 3]>,
+    pub(crate) bounds_max: Option<[f64; 3]>,
+    pub(crate) cameras: Vec<CameraLine>,
 }
 
-#[derive(Deserialize)]
-struct CameraLine {
-    eye: [f32; 3],
-    target: [f32; 3],
+#[derive(Debug, Deserialize)]
+pub(crate) struct CameraLine {
+    pub(crate) name: Option<String>,
+    pub(crate) eye: [f32; 3],
+    pub(crate) target: [f32; 3],
     up: [f32; 3],
-    fov_y_deg: f32,
+    pub(crate) fov_y_deg: f32,
 }
 
 /// The shared data beside the workspace: Cargo names this crate's folder to what it runs; otherwise
 /// the current folder is taken for it.
-fn scenes_folder() -> PathBuf {
+pub(crate) fn scenes_folder() -> PathBuf {
     let member = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
     let workspace = member.as_deref().and_then(Path::parent);
     workspace
@@ -92,15 +97,21 @@ fn load(folder: &Path, name: &str) -> Result<BenchScene, String> {
 
 /// The first camera of a scene in `cameras.json`.
 fn camera(folder: &Path, name: &str) -> Option<Camera> {
-    let text = fs::read_to_string(folder.join("cameras.json")).ok()?;
-    let cameras: Cameras = serde_json::from_str(&text).ok()?;
-    let line = cameras.scenes.get(name)?.cameras.first()?;
+    let scenes = cameras_file(folder)?;
+    let line = scenes.get(name)?.cameras.first()?;
     Some(Camera {
         origin: line.eye.into(),
         target: line.target.into(),
         up: line.up.into(),
         vertical_fov_degrees: line.fov_y_deg,
     })
+}
+
+/// The scenes of `cameras.json` in a folder, if it can be read.
+pub(crate) fn cameras_file(folder: &Path) -> Option<HashMap<String, SceneCameras>> {
+    let text = fs::read_to_string(folder.join("cameras.json")).ok()?;
+    let cameras: Cameras = serde_json::from_str(&text).ok()?;
+    Some(cameras.scenes)
 }
 
 fn bench_scene(name: &str, world: World) -> BenchScene {

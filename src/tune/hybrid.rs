@@ -145,8 +145,10 @@ pub struct Hybrid<'a, C> {
     film: Film,
     finished: u32,
     incumbent: Option<Incumbent>,
-    /// Seconds that each tile is expected to take with the incumbent.
+    /// Seconds that a thread is expected to work for each tile with the incumbent.
     tiles: Vec<f64>,
+    /// Seconds of a frame for each second that its threads work.
+    wall_per_work: f64,
     /// Seconds that the first frame cost.
     unit: f64,
     /// What is known of candidates beside this incumbent, and by how many probes.
@@ -183,6 +185,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let tuner = Tuner::new(space.space().clone(), search(), settings.seed);
         Ok(Self {
             tiles: Vec::new(),
+            wall_per_work: 1.0,
             stage,
             space,
             search: MakeSearch(Box::new(search)),
@@ -272,6 +275,10 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let Some((candidate, build)) = tried? else {
             return Ok(None);
         };
+        if candidate.is_none() {
+            let render = (self.stage.now() - start).saturating_sub(build);
+            self.learn_sharing(render, &frame.times, FRESH);
+        }
         self.watch(&frame.times);
         add_frame(&mut self.film, &frame.film);
         self.finished += 1;
@@ -307,6 +314,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         for &(tile, time) in &frame.times {
             self.tiles[tile] = time;
         }
+        let render = (self.stage.now() - start).saturating_sub(build);
+        self.learn_sharing(render, &frame.times, 1.0);
         let incumbent = Incumbent {
             config: trial.canonical.clone(),
             params: self.first,
@@ -547,8 +556,22 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     #[must_use]
     pub fn incumbent_cost(&self) -> Option<f64> {
         let incumbent = self.incumbent.as_ref()?;
-        let render = self.tiles.iter().sum();
-        Some(self.stage.settings.metric.cost(incumbent.build(), render))
+        let metric = self.stage.settings.metric;
+        Some(metric.cost(incumbent.build(), self.render_time()))
+    }
+
+    /// Seconds that a frame is expected to take to render with the incumbent.
+    fn render_time(&self) -> f64 {
+        self.wall_per_work * self.tiles.iter().sum::<f64>()
+    }
+
+    /// Learns from a frame of the incumbent alone how well threads share its work.
+    fn learn_sharing(&mut self, render: Duration, times: &[(usize, f64)], weight: f64) {
+        let work: f64 = times.iter().map(|(_, time)| time).sum();
+        let share = render.as_secs_f64() / work;
+        if share > 0.0 && share.is_finite() {
+            self.wall_per_work += weight * (share - self.wall_per_work);
+        }
     }
 
     /// Whether something is still tried.

@@ -21,6 +21,9 @@ pub(super) const SHARES: [f64; 4] = [1.0 / 32.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0
 /// Quantile of the normal distribution of a one-sided bound of 95 %.
 const ONE_SIDED: f64 = 1.645;
 
+/// The same of 99 %, for what is accepted: a probe is looked at several times, and there are many.
+const SURE: f64 = 2.326;
+
 /// A candidate is rejected when the lower bound of its cost over that of the incumbent is above this…
 const WORSE: f64 = 1.02;
 /// …or, before more than the first part is rendered, when it is expected to be above this.
@@ -29,8 +32,9 @@ const MUCH_WORSE: f64 = 1.25;
 /// Times what is usual of a tile from which it was interrupted.
 pub(super) const INTERRUPTED: f64 = 3.0;
 
-/// Pairs below which bounds are not believed.
+/// Pairs below which bounds are not believed; and pairs that it takes to accept.
 const FEW_PAIRS: usize = 5;
+const ENOUGH_PAIRS: usize = 16;
 
 /// Standard deviation of the logarithm of a ratio beside what its pairs show: that of the tree itself, which
 /// lies elsewhere in memory the next time. Paired ratios of whole frames repeat to about this.
@@ -118,7 +122,11 @@ impl ProbeRatio {
     /// The ratio, and its lower and upper bound of 95 %, each by itself.
     #[must_use]
     pub fn bounds(self) -> [f64; 3] {
-        let reach = ONE_SIDED * self.deviation;
+        self.bounds_at(ONE_SIDED)
+    }
+
+    fn bounds_at(self, quantile: f64) -> [f64; 3] {
+        let reach = quantile * self.deviation;
         [self.log, self.log - reach, self.log + reach].map(f64::exp)
     }
 }
@@ -204,8 +212,12 @@ impl Costs {
     /// itself.
     #[must_use]
     pub fn bounds(&self, ratio: ProbeRatio) -> [f64; 3] {
-        let [expected, lower, upper] = ratio.bounds().map(|bound| self.ratio(bound));
-        let build = ONE_SIDED * BUILD_DEVIATION * self.candidate_build
+        self.bounds_at(ratio, ONE_SIDED)
+    }
+
+    fn bounds_at(&self, ratio: ProbeRatio, quantile: f64) -> [f64; 3] {
+        let [expected, lower, upper] = ratio.bounds_at(quantile).map(|bound| self.ratio(bound));
+        let build = quantile * BUILD_DEVIATION * self.candidate_build
             / (self.incumbent_build + self.render);
         [
             expected,
@@ -217,10 +229,11 @@ impl Costs {
     /// What is to be done with a candidate.
     #[must_use]
     pub fn decide(&self, ratio: ProbeRatio) -> Decision {
-        let [expected, lower, upper] = self.bounds(ratio);
+        let [expected, lower, _] = self.bounds(ratio);
+        let [_, _, upper] = self.bounds_at(ratio, SURE);
         if lower > WORSE || (ratio.pairs >= FEW_PAIRS && expected > MUCH_WORSE) {
             Decision::Rejected
-        } else if upper < 1.0 {
+        } else if upper < 1.0 && ratio.pairs >= ENOUGH_PAIRS {
             Decision::Accepted
         } else {
             Decision::Undecided

@@ -19,6 +19,12 @@ use super::{metric::Metric, space::SpaceFault};
 pub trait Clock: Sync {
     /// Time since a moment that does not change.
     fn now(&self) -> Duration;
+
+    /// Time that the calling thread has worked since a moment that does not change: what other programs take
+    /// from it is left out, if the clock can tell.
+    fn busy(&self) -> Duration {
+        self.now()
+    }
 }
 
 /// The wall clock.
@@ -36,6 +42,14 @@ impl WallClock {
 impl Clock for WallClock {
     fn now(&self) -> Duration {
         self.0.elapsed()
+    }
+
+    #[cfg(unix)]
+    fn busy(&self) -> Duration {
+        use rustix::time::{ClockId, clock_gettime};
+
+        let time = clock_gettime(ClockId::ThreadCPUTime);
+        Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
     }
 }
 
@@ -224,8 +238,8 @@ impl<'a, C: Clock> Stage<'a, C> {
         TileLoop::new().tiles(self.settings.width, self.settings.height)
     }
 
-    /// Adds one sample to every pixel of those tiles for which there is a tree; what each took, in seconds.
-    /// After `limit` no further tile is begun, nor after a cancellation.
+    /// Adds one sample to every pixel of those tiles for which there is a tree; what a thread
+    /// worked for each, in seconds. After `limit` no further tile is begun, nor after a cancellation.
     pub(super) fn render_tiles<'t>(
         &self,
         film: &mut Film,
@@ -243,12 +257,12 @@ impl<'a, C: Clock> Stage<'a, C> {
             let Some(tree) = tree_of(tile.index) else {
                 return;
             };
-            let start = self.clock.now();
-            if cancel.is_cancelled() || start - begun > limit {
+            if cancel.is_cancelled() || self.clock.now() - begun > limit {
                 return;
             }
+            let start = self.clock.busy();
             shot.render_tile(&projection, tile, view, sample..sample + 1, tree);
-            let time = (self.clock.now() - start).as_secs_f64();
+            let time = (self.clock.busy() - start).as_secs_f64();
             let mut times = times.lock().unwrap_or_else(PoisonError::into_inner);
             times.push((tile.index, time));
         });

@@ -1,4 +1,4 @@
-//! `cargo bench -p raywright-benches --bench predictors [-- FOLDER [SEED]]`: how much of a search can be predicted?
+//! `cargo bench -p raywright-benches --bench predictors [-- FOLDER SEED]`: how much of a search can be predicted?
 //!
 //! The protocol of the autotuning paper (Herveau, Pfaffe, Tillmann, Tichy & Dachsbacher, section 7) on recorded
 //! tables: a search of 80 frames for each scene and camera; predictors learn what the searches saw in 80 % of
@@ -15,29 +15,21 @@
 //! Goals are those of the paper's summary, for the predictor that removes most of the overhead on the very
 //! predictions that are judged: a choice among many by 30 numbers. Other seeds tell how firm it is.
 
-#[path = "../replay/problems.rs"]
-mod problems;
-#[path = "../replay/spaces.rs"]
-mod spaces;
-
 mod methods;
 mod recorded;
-mod states;
 
-use std::{
-    collections::BTreeMap,
-    env,
-    error::Error,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, error::Error};
 
 use methods::{Answer, methods};
-use problems::{Metric, problems};
+use raywright_benches::{
+    goals::Goals,
+    recordings::{DataSet, Metric, Problem, SpaceKind, State, arguments, data_sets, features},
+};
 use recorded::{Case, FRAMES, Table};
-use spaces::SpaceKind;
-use states::{features, states};
 
 const REPEATS: u64 = 15;
+/// With four fifths of these, something is known and something asked.
+const LEAST_STATES: usize = 5;
 
 /// One prediction, judged.
 #[derive(Clone, Debug)]
@@ -55,65 +47,68 @@ struct Score {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // cargo bench hands its own options on.
-    let mut given = env::args().skip(1).filter(|arg| !arg.starts_with('-'));
-    let folder = given.next().map_or_else(
-        || {
-            let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-            root.join("../../shared/data/tuning")
-        },
-        PathBuf::from,
-    );
-    if !folder.join("builder_table.csv").is_file() {
-        println!("{} has no recorded problems", folder.display());
-        return Ok(());
-    }
-    let seed = given.next().map_or(Ok(0), |seed| seed.parse())?;
-    let (mut all, mut missed, mut judged) = (0, Vec::new(), Vec::new());
-    for metric in Metric::ALL {
-        let scores = scores(&folder, metric, seed)?;
-        let best = print(metric, &scores);
-        let (name, rows) = &scores[best];
-        judged.push(format!("judged: {}, {name}", metric.name()));
-        for (what, value, least) in [
-            ("of the roofline", geometric(rows, |s| s.roofline), 0.95),
-            (
-                "of the overhead removed",
-                mean(rows, |s| s.overhead_removed),
-                0.9,
-            ),
-        ] {
-            all += 1;
-            if value.is_nan() || value < least {
-                let metric = metric.name();
-                missed.push(format!(
-                    "missed: {metric}, {name}: {:.1} % {what}, not {:.0}",
-                    100.0 * value,
+    let (folder, seed) = arguments();
+    let seed = seed.unwrap_or(0);
+    let (mut goals, mut judged) = (Goals::default(), Vec::new());
+    for set in data_sets(folder.as_deref())? {
+        let cases: Vec<(&Problem, &State)> = set
+            .problems
+            .iter()
+            .filter_map(|problem| Some((problem, problem.state.as_ref()?)))
+            .collect();
+        println!("\n{}: {} states", set.name, cases.len());
+        if cases.len() < LEAST_STATES {
+            println!("left out: less than {LEAST_STATES} whose cameras are known");
+            continue;
+        }
+        for metric in Metric::ALL {
+            let scores = scores(&set, &cases, metric, seed)?;
+            let best = print(metric, &scores);
+            let (name, rows) = &scores[best];
+            let what = format!("{}, {}", set.name, metric.name());
+            judged.push(format!("judged: {what}, {name}"));
+            for (share, value, least) in [
+                ("of the roofline", geometric(rows, |s| s.roofline), 0.95),
+                (
+                    "of the overhead removed",
+                    mean(rows, |s| s.overhead_removed),
+                    0.9,
+                ),
+            ] {
+                let percent = 100.0 * value;
+                let what = format!(
+                    "{what}, {name}: {percent:.1} % {share}, not {:.0}",
                     100.0 * least
-                ));
+                );
+                goals.check(what, value >= least);
             }
         }
     }
     println!();
-    for line in judged.iter().chain(&missed) {
+    for line in judged {
         println!("{line}");
     }
-    println!("goals: {} of {all} met", all - missed.len());
+    goals.print();
     Ok(())
 }
 
 /// For each method, by name, all of its predictions.
 type Scores = Vec<(&'static str, Vec<Score>)>;
 
-fn scores(folder: &Path, metric: Metric, seed: u64) -> Result<Scores, Box<dyn Error>> {
-    let (problems, states, features) = (problems(folder)?, states(folder)?, features()?);
-    let tables = |kind| -> Result<Vec<Table>, Box<dyn Error>> {
+fn scores(
+    set: &DataSet,
+    states: &[(&Problem, &State)],
+    metric: Metric,
+    seed: u64,
+) -> Result<Scores, Box<dyn Error>> {
+    let features = features()?;
+    let tables = |kind| -> Vec<Table> {
+        let problems = states.iter();
         problems
-            .iter()
-            .map(|problem| Table::new(kind, problem))
+            .map(|(problem, _)| Table::new(set, kind, problem))
             .collect()
     };
-    let (printed, canonical) = (tables(SpaceKind::Printed)?, tables(SpaceKind::Canonical)?);
+    let (printed, canonical) = (tables(SpaceKind::Printed), tables(SpaceKind::Canonical));
     let methods = methods();
     let mut scores: Scores = methods
         .iter()
@@ -121,9 +116,9 @@ fn scores(folder: &Path, metric: Metric, seed: u64) -> Result<Scores, Box<dyn Er
         .collect();
     let mut draw = draws(seed);
     for repeat in (0..REPEATS).map(|repeat| seed * REPEATS + repeat) {
-        let cases = problems
+        let cases = states
             .iter()
-            .map(|problem| Case::new(problem, &states[&problem.name], metric, repeat))
+            .map(|&state| Case::new(set, state, metric, repeat))
             .collect::<Result<Vec<_>, _>>()?;
         let mut order: Vec<usize> = (0..cases.len()).collect();
         for last in (1..order.len()).rev() {

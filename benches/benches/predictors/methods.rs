@@ -2,16 +2,13 @@
 
 use std::error::Error;
 
+use raywright_benches::recordings::{Metric, SpaceKind};
 use raywright_tuner::predict::{
     Features, Kernel, LeastSquares, NearestNeighbour, Portfolio, Predictor, RadialBasis,
     RadialSettings, Reward, Scaling, StepSize, Terms, greedy_members,
 };
 
-use crate::{
-    problems::Metric,
-    recorded::{Case, Table},
-    spaces::SpaceKind,
-};
+use crate::recorded::{Case, Table};
 
 /// A way to a configuration without a search.
 #[derive(Clone, Copy, Debug)]
@@ -264,7 +261,7 @@ fn predicted(
 fn costs(known: &[(&Case, &Table)], metric: Metric) -> Vec<Vec<(Vec<f64>, f64)>> {
     let of = |&(case, table): &(&Case, &Table)| {
         let rows = case.problem.rows.iter().zip(&table.points);
-        rows.filter_map(|((_, costs), point)| Some((point.clone(), (*costs)?[metric as usize])))
+        rows.filter_map(|(row, point)| Some((point.clone(), row.costs?[metric as usize])))
             .collect()
     };
     known.iter().map(of).collect()

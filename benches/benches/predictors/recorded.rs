@@ -2,13 +2,8 @@
 
 use std::error::Error;
 
-use raywright_tuner::{Config, Outcome, Space, Tuner, replay::Pool, search_by_name};
-
-use crate::{
-    problems::{Metric, Problem},
-    spaces::SpaceKind,
-    states::State,
-};
+use raywright_benches::recordings::{DataSet, Metric, Problem, SpaceKind, State};
+use raywright_tuner::{Outcome, Tuner, replay::Pool, search_by_name};
 
 /// Frames of a search.
 pub(crate) const FRAMES: usize = 80;
@@ -20,11 +15,11 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    pub(crate) fn new(kind: SpaceKind, problem: &Problem) -> Result<Table, Box<dyn Error>> {
-        let space = kind.space()?;
-        let configs = configs(kind, &space, problem)?;
-        let points = configs.iter().map(|config| space.encode(config)).collect();
-        Ok(Table { points })
+    pub(crate) fn new(set: &DataSet, kind: SpaceKind, problem: &Problem) -> Table {
+        let space = set.space(kind);
+        let configs = problem.rows.iter().map(|row| row.config(kind));
+        let points = configs.map(|config| space.encode(config)).collect();
+        Table { points }
     }
 
     /// The row nearest to a point: what is predicted need not have been measured here.
@@ -37,15 +32,6 @@ impl Table {
         rows.min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .unwrap_or(0)
     }
-}
-
-fn configs(
-    kind: SpaceKind,
-    space: &Space,
-    problem: &Problem,
-) -> Result<Vec<Config>, Box<dyn Error>> {
-    let configs = problem.rows.iter().map(|(row, _)| kind.config(space, row));
-    Ok(configs.collect::<Result<_, _>>()?)
 }
 
 /// A problem and one search on it.
@@ -64,30 +50,24 @@ pub(crate) struct Case<'a> {
 impl<'a> Case<'a> {
     /// Latin hypercube and simplex in the printed space.
     pub(crate) fn new(
-        problem: &'a Problem,
-        state: &'a State,
+        set: &DataSet,
+        (problem, state): (&'a Problem, &'a State),
         metric: Metric,
         seed: u64,
     ) -> Result<Case<'a>, Box<dyn Error>> {
         let kind = SpaceKind::Printed;
-        let space = kind.space()?;
-        let configs = configs(kind, &space, problem)?;
-        let outcomes = problem.rows.iter().map(|(_, costs)| match costs {
-            Some(costs) => Outcome::Done {
-                cost: costs[metric as usize],
-            },
-            None => Outcome::Failed {
-                reason: "the depth limit was reached".into(),
-            },
-        });
-        let mut pool = Pool::new(&space, configs.iter().cloned().zip(outcomes));
+        let rows = problem.rows.iter();
+        let rows = rows.map(|row| (row.config(kind).clone(), row.outcome(metric)));
+        let mut pool = Pool::new(set.space(kind), rows);
         let search = search_by_name("nelder-mead").ok_or("no such search")?;
-        let mut tuner = Tuner::new(space, search, seed);
+        let mut tuner = Tuner::new(set.space(kind).clone(), search, seed);
         let (mut paid, mut roofline) = (0.0, f64::INFINITY);
         for _ in 0..FRAMES {
             let trial = tuner.ask();
-            let answer = pool.answer(&mut tuner, &trial)?;
-            let (outcome, _) = answer.ok_or("the pool is empty")?;
+            // A table of fewer rows is known by then, and its best is what is shown from there on.
+            let outcome = pool
+                .answer(&mut tuner, &trial)?
+                .map_or(Outcome::Done { cost: roofline }, |answer| answer.0);
             match outcome {
                 Outcome::Done { cost } => {
                     roofline = roofline.min(cost);
@@ -99,7 +79,8 @@ impl<'a> Case<'a> {
         }
         let mut samples = Vec::new();
         for record in tuner.records() {
-            let row = configs.iter().position(|config| *config == record.config);
+            let mut rows = problem.rows.iter();
+            let row = rows.position(|row| *row.config(kind) == record.config);
             let row = row.ok_or("a record that is no row")?;
             samples.extend(record.costs.iter().map(|&cost| (row, cost)));
         }
@@ -114,7 +95,7 @@ impl<'a> Case<'a> {
 
     /// The cost of a row; where its build was refused that of the weak default, which then stands in.
     pub(crate) fn cost(&self, row: usize, metric: Metric) -> f64 {
-        let costs = self.problem.rows[row].1;
+        let costs = self.problem.rows[row].costs;
         costs.map_or(1.0, |costs| costs[metric as usize])
     }
 }

@@ -105,7 +105,7 @@ impl<C: Clock> Hybrid<'_, C> {
     fn costs(&self, incumbent: &Incumbent, build: f64) -> Costs {
         let share = self.stage.settings.metric.build_share();
         Costs {
-            render: self.tiles.iter().sum(),
+            render: self.render_time(),
             incumbent_build: share * incumbent.build(),
             candidate_build: share * build,
         }
@@ -179,6 +179,10 @@ impl<C: Clock> Hybrid<'_, C> {
             frame.times.extend(&probe.candidate_times);
             let factor = probe.all.log.exp();
             self.tiles.iter_mut().for_each(|time| *time *= factor);
+            // Most of them are known now.
+            for &(tile, time) in &frame.times {
+                self.tiles[tile] = time;
+            }
             let old = std::mem::replace(&mut incumbent.tree, tree);
             self.stage.recycle(old);
             incumbent.config = trial.canonical.clone();

@@ -3,7 +3,7 @@
 
 use raywright_tuner::{CanonRule, Config, Param, Scale, Space, SpaceError, Value};
 
-use crate::problems::Row;
+use super::shared::TableRow;
 
 /// Ratios of costs beyond which leaves are as small or as large as they may be.
 const MOST_RATIO: f64 = 64.0;
@@ -11,17 +11,18 @@ const MOST_RATIO: f64 = 64.0;
 const MAX_LEAF: i64 = 32;
 const MAX_COST: f64 = 10.0;
 
-/// A space that recorded rows have a place in.
+/// A space that recorded rows have a place in. Here that of the shared tables is made; our own recordings
+/// have the engine's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum SpaceKind {
+pub enum SpaceKind {
     /// As printed, without what changes no tree of ours.
     Printed,
-    /// Seven axes.
+    /// What builds the same tree is one point.
     Canonical,
 }
 
 impl SpaceKind {
-    pub(crate) fn space(self) -> Result<Space, SpaceError> {
+    pub(super) fn space(self) -> Result<Space, SpaceError> {
         let quality = Param::ordinal("quality", vec![1, 2, 3], "Builder.");
         let branching = Param::ordinal("branching", vec![2, 4, 8], "Children.");
         let max_depth = Param::integer("max_depth", 8..=64, Scale::Log, "Depth limit.");
@@ -72,7 +73,7 @@ impl SpaceKind {
     }
 
     /// The configuration of a row.
-    pub(crate) fn config(self, space: &Space, row: &Row) -> Result<Config, SpaceError> {
+    pub(super) fn config(self, space: &Space, row: &TableRow) -> Result<Config, SpaceError> {
         let (min_leaf, max_leaf) = (row.min_leaf.min(row.max_leaf), row.max_leaf);
         let mut values = vec![
             ("quality", Value::Integer(row.quality)),

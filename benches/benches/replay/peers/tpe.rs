@@ -4,10 +4,9 @@ use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 use raywright_tuner::{Estimate, Proposal, Search};
 use tpe::{TpeOptimizer, parzen_estimator, range};
 
-pub(crate) const NAME: &str = "tpe";
+use super::FAILURE;
 
-/// What it is told of a failure: worse than anything that was measured.
-const FAILURE: f64 = 100.0;
+pub(super) const NAME: &str = "tpe";
 
 #[derive(Debug, Default)]
 pub(crate) struct Tpe {
@@ -40,11 +39,7 @@ impl Search for Tpe {
     }
 
     fn observe(&mut self, _ticket: Option<u64>, point: &[f64], estimate: Estimate) {
-        let cost = if estimate.mean.is_finite() {
-            estimate.mean
-        } else {
-            FAILURE
-        };
+        let cost = estimate.mean.min(FAILURE);
         for (axis, x) in self.axes.iter_mut().zip(point) {
             // Its range has no end.
             axis.tell(x.min(1.0_f64.next_down()), cost)
