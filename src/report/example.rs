@@ -91,7 +91,7 @@ pub(crate) fn probed(frames: usize) -> RunRecord {
         frame.reason = Some("gaussian-process: expected improvement".to_string());
         let noise = 1.0 + (pick(index, 10, 100) as f64 - 50.0) / 4000.0;
         if index == 0 || index % 12 == 7 {
-            frame.reason = Some(if index == 0 { "start" } else { "incumbent" }.to_string());
+            frame.reason = (index == 0).then(|| "start".to_string());
             frame.build_ms = (index == 0).then_some(24.0);
             frame.render_ms = Some(incumbent * noise);
             frame.frame_ms = Some(incumbent * noise + if index == 0 { 24.0 } else { 0.0 });
@@ -125,7 +125,8 @@ pub(crate) fn probed(frames: usize) -> RunRecord {
     run
 }
 
-fn probe(share: f64, pairs: usize, ratio: f64, decision: &str) -> ProbeRecord {
+/// A probe with the bounds that so many pairs have.
+pub(crate) fn probe(share: f64, pairs: usize, ratio: f64, decision: &str) -> ProbeRecord {
     let deviation = if pairs < 5 {
         f64::INFINITY
     } else {

@@ -85,7 +85,7 @@ pub fn page(run: &RunRecord, picture_png: Option<&[u8]>) -> String {
         body.push_str(&format!(
             "<h2>Failed trials</h2>\n<p>{} of {} trials failed.</p>\n{}",
             number::count(failed),
-            number::count(run.frames.len()),
+            number::count(trials::tried(&run.frames).count()),
             tables::failures(&failures).html()
         ));
     }
@@ -177,7 +177,7 @@ fn result(run: &RunRecord, trials: &[Trial<'_>]) -> String {
         verdict::class(run),
         escape(&verdict::headline(run, trials))
     );
-    for caveat in verdict::caveats(run, run.frames.len() - trials.len()) {
+    for caveat in verdict::caveats(run, trials::tried(&run.frames).count() - trials.len()) {
         html.push_str(&format!("<p class=\"caveat\">{}</p>\n", escape(&caveat)));
     }
     html

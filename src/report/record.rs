@@ -74,7 +74,8 @@ pub struct FrameRecord {
     /// How the candidate did on some tiles of the frame, if it was probed.
     #[serde(default)]
     pub probe: Option<ProbeRecord>,
-    /// Why this configuration was asked for: `incumbent`, `start`, or the words of a search.
+    /// Why this configuration was asked for: `start`, or the words of a search. Absent if nothing
+    /// was tried, as in frames of the incumbent alone (or `incumbent`), and in old logs.
     #[serde(default)]
     pub reason: Option<String>,
 }

@@ -55,7 +55,7 @@ impl Kind {
             Self::AcceptedProbe
         } else if decision.is_some() {
             Self::Probe
-        } else if frame.reason.as_deref() == Some("incumbent") {
+        } else if is_of_the_incumbent(frame) {
             Self::Incumbent
         } else {
             Self::Trial
@@ -80,6 +80,15 @@ impl Kind {
             Self::AcceptedProbe => "kind-accepted",
             Self::Failed => "bad",
         }
+    }
+}
+
+/// Whether nothing was tried in a frame without a probe. Logs that have no times of whole frames have
+/// no such frames: there, no reason means that none was kept.
+fn is_of_the_incumbent(frame: &FrameRecord) -> bool {
+    match frame.reason.as_deref() {
+        Some(reason) => reason == "incumbent",
+        None => frame.frame_ms.is_some() && !frame.is_incumbent,
     }
 }
 
@@ -324,6 +333,16 @@ mod tests {
             assert!(found, "{kind:?}");
         }
         assert_eq!(Kind::of(&example::frame(0)), Kind::Trial);
+        let mut alone = FrameRecord {
+            frame_ms: Some(40.0),
+            cost_ms: None,
+            ..example::frame(0)
+        };
+        assert_eq!(Kind::of(&alone), Kind::Incumbent);
+        alone.reason = Some("start".to_string());
+        assert_eq!(Kind::of(&alone), Kind::Trial);
+        (alone.reason, alone.is_incumbent) = (None, true);
+        assert_eq!(Kind::of(&alone), Kind::Trial, "the first of all");
         assert_eq!(Kind::of(&example::frame(11)), Kind::Failed);
     }
 

@@ -5,7 +5,7 @@
 //! mean over whatever else differs between its trials: a map of what was seen, not of an effect.
 
 use super::figure;
-use super::trials::{Trial, value_of};
+use super::trials::{Trial, render_ms, value_of};
 use crate::report::number;
 use crate::report::record::FrameRecord;
 use crate::report::svg::Size;
@@ -37,7 +37,7 @@ pub(super) fn section(trials: &[Trial<'_>]) -> String {
     };
     html + &format!(
         "<div class=\"pair\">\n{}{}</div>\n",
-        map("mean time to render (ms)", |frame| frame.render_ms),
+        map("mean time to render (ms)", render_ms),
         map("mean time to build (ms)", |frame| frame.build_ms)
     )
 }

@@ -1,6 +1,6 @@
 //! The plots of the page: from frames and comparison to layers and colours.
 
-use super::trials::{Trial, quarters, value_of};
+use super::trials::{Trial, quarters, render_ms, tried, value_of};
 use crate::report::number;
 use crate::report::record::{ComparisonRow, FrameRecord};
 use crate::report::svg::bars::{Bar, bars};
@@ -94,8 +94,7 @@ pub(super) fn history(
         radius: 4.5,
         marks: marks(true, "incumbent"),
     });
-    let failed: Vec<&FrameRecord> = frames
-        .iter()
+    let failed: Vec<&FrameRecord> = tried(frames)
         .filter(|frame| frame.cost_ms.is_none_or(|cost| !cost.is_finite()))
         .collect();
     let stride = failed.len().div_ceil(MOST_CROSSES).max(1);
@@ -128,7 +127,7 @@ pub(super) fn history(
 /// Build time against render time of every frame, and of the compared configurations.
 pub(super) fn build_and_render(trials: &[Trial<'_>], compared: &[ComparisonRow]) -> String {
     let mut layers = vec![ranked_marks(trials, |frame| {
-        Some((frame.build_ms?, frame.render_ms?))
+        Some((frame.build_ms?, render_ms(frame)?))
     })];
     for (index, row) in compared.iter().enumerate() {
         layers.push(Layer::Marks {
@@ -265,7 +264,7 @@ fn title(trial: &Trial<'_>) -> String {
         trial.frame.frame,
         number::milliseconds(trial.cost_ms),
         time(trial.frame.build_ms),
-        time(trial.frame.render_ms),
+        time(render_ms(trial.frame)),
         config.join("\n")
     )
 }

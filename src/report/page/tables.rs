@@ -3,7 +3,7 @@
 use super::ABSENT;
 use super::frames::whole_ms;
 use super::table::{Cell, Table};
-use super::trials::{Configuration, Failure, parameters, value_of};
+use super::trials::{Configuration, Failure, parameters, render_ms, value_of};
 use super::verdict::{Outcome, metric, outcome};
 use crate::report::number;
 use crate::report::record::{ComparisonRow, FrameRecord, RunHeader, Spread};
@@ -97,7 +97,7 @@ pub(super) fn best(
                 Cell::Number((index + 1).to_string()),
                 Cell::Number(frame.frame.to_string()),
             ];
-            cells.extend([frame.cost_ms, frame.build_ms, frame.render_ms].map(time));
+            cells.extend([frame.cost_ms, frame.build_ms, render_ms(frame)].map(time));
             cells.push(Cell::Number(format!("{} ×", configuration.measurements)));
             cells.extend(parameters.iter().map(|name| parameter(&frame.config, name)));
             cells

@@ -1,8 +1,11 @@
 //! What the frames of a run say, sorted for the page: what was measured, what failed, what was best.
 //!
-//! A frame counts as measured if its cost is a finite number, and as failed otherwise: every frame
-//! is one or the other, so nothing is lost between the tables.
+//! A frame in which something was tried counts as measured if its cost is a finite number, and as
+//! failed otherwise: it is one or the other, so nothing is lost between the tables. A frame of the
+//! incumbent alone is neither, whatever it took: a run that has found its best would be hundreds of
+//! times the same trial.
 
+use super::frames::{Kind, build_part_ms, whole_ms};
 use crate::report::record::FrameRecord;
 
 /// A measured frame.
@@ -31,12 +34,18 @@ pub(super) struct Failure {
     pub(super) frames: Vec<usize>,
 }
 
+/// The frames in which something was tried.
+pub(super) fn tried(frames: &[FrameRecord]) -> impl Iterator<Item = &FrameRecord> {
+    frames
+        .iter()
+        .filter(|frame| Kind::of(frame) != Kind::Incumbent)
+}
+
 /// The measured frames in their order.
 pub(super) fn measured(frames: &[FrameRecord]) -> Vec<Trial<'_>> {
     let costs = sorted_costs(frames);
     let others = costs.len().saturating_sub(1).max(1) as f64;
-    frames
-        .iter()
+    tried(frames)
         .filter_map(|frame| {
             let cost_ms = finite_cost(frame)?;
             let lower = costs.partition_point(|&cost| cost < cost_ms);
@@ -65,10 +74,22 @@ pub(super) fn thinned<'a>(trials: &[Trial<'a>], limit: usize) -> Vec<Trial<'a>> 
     kept.map(|(_, trial)| *trial).collect()
 }
 
+/// Time to render a frame with the configuration that was tried. A frame with a probe was rendered with
+/// two: of R, what it takes with the incumbent, it took R (1 − s + s r), and the candidate takes R r.
+pub(super) fn render_ms(frame: &FrameRecord) -> Option<f64> {
+    let of_the_candidate = || {
+        let probe = frame.probe.as_ref()?;
+        let rendering = whole_ms(frame)? - build_part_ms(frame);
+        let time = rendering * probe.ratio / (1.0 + probe.share * (probe.ratio - 1.0));
+        (time.is_finite() && time >= 0.0).then_some(time)
+    };
+    of_the_candidate().or(frame.render_ms)
+}
+
 /// The failed frames by reason, the most frequent first.
 pub(super) fn failures(frames: &[FrameRecord]) -> Vec<Failure> {
     let mut failures: Vec<Failure> = Vec::new();
-    for frame in frames.iter().filter(|frame| finite_cost(frame).is_none()) {
+    for frame in tried(frames).filter(|frame| finite_cost(frame).is_none()) {
         let reason = match (&frame.failure, frame.cost_ms) {
             (Some(reason), _) => reason.as_str(),
             (None, Some(_)) => "the cost is not a finite number",
@@ -170,7 +191,7 @@ fn finite_cost(frame: &FrameRecord) -> Option<f64> {
 }
 
 fn sorted_costs(frames: &[FrameRecord]) -> Vec<f64> {
-    let mut costs: Vec<f64> = frames.iter().filter_map(finite_cost).collect();
+    let mut costs: Vec<f64> = tried(frames).filter_map(finite_cost).collect();
     costs.sort_by(f64::total_cmp);
     costs
 }
@@ -233,6 +254,35 @@ mod tests {
             .sum();
         assert_eq!(measured(&frames).len() + failed, frames.len());
         assert!(measured(&frames).iter().all(|trial| trial.rank <= 1.0));
+    }
+
+    #[test]
+    fn a_frame_of_the_incumbent_alone_is_no_trial() {
+        let mut frames = with_costs(&[3.0, 1.0, 2.0]);
+        frames[1].frame_ms = Some(1.0);
+        let of = |frames: &[FrameRecord]| (measured(frames).len(), failures(frames).len());
+        assert_eq!(of(&frames), (2, 0));
+        frames[1].cost_ms = None;
+        assert_eq!(of(&frames), (2, 0));
+        assert_eq!(quarters(&frames)[0], 2.0);
+        frames[1].reason = Some("start".to_string());
+        assert_eq!(of(&frames), (2, 1));
+    }
+
+    #[test]
+    fn the_time_of_a_candidate_is_found_from_a_part_of_the_frame() {
+        let mut frame = FrameRecord {
+            build_ms: Some(5.0),
+            render_ms: Some(110.0),
+            frame_ms: Some(115.0),
+            ..example::frame(0)
+        };
+        assert_eq!(render_ms(&frame), Some(110.0));
+        // A fifth of the tiles with half as much again: 110 instead of 100.
+        frame.probe = Some(example::probe(0.2, 30, 1.5, "rejected"));
+        assert!((render_ms(&frame).unwrap() - 150.0).abs() < 1e-9);
+        frame.probe.as_mut().unwrap().ratio = f64::NAN;
+        assert_eq!(render_ms(&frame), Some(110.0));
     }
 
     #[test]

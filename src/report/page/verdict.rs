@@ -4,7 +4,7 @@
 //! come from the interleaved comparison at the end, never from the lowest cost of the search: the
 //! minimum of noisy values is biased low.
 
-use super::trials::Trial;
+use super::trials::{self, Trial};
 use crate::report::number;
 use crate::report::record::{ComparisonRow, RunRecord};
 
@@ -92,7 +92,10 @@ pub(super) fn headline(run: &RunRecord, trials: &[Trial<'_>]) -> String {
         None if run.frames.is_empty() => {
             format!("To be tuned for {metric}: no frame has been tried yet.")
         }
-        None => format!("Not tuned for {metric}: every frame failed."),
+        None if trials::tried(&run.frames).next().is_none() => {
+            format!("Not tuned for {metric}: nothing was tried beside the incumbent.")
+        }
+        None => format!("Not tuned for {metric}: every trial failed."),
     }
 }
 
@@ -255,7 +258,11 @@ mod tests {
         run.summary = None;
         assert!(headline(&run, &[]).contains("no frame has been tried"));
         run.frames = vec![example::frame(11)];
-        assert!(headline(&run, &[]).contains("every frame failed"));
+        assert!(headline(&run, &[]).contains("every trial failed"));
+        run.frames[0].failure = None;
+        run.frames[0].frame_ms = Some(9.0);
+        assert!(headline(&run, &[]).contains("nothing was tried"));
+        run.frames = vec![example::frame(11)];
         assert!(
             caveats(&run, 1)
                 .iter()
