@@ -1,7 +1,7 @@
 //! Recorded problems: for each scene and camera what every configuration took, by two metrics, so that
 //! searches and predictors are judged without one frame.
 //!
-//! A data set is the tables of the shared data ([`shared`]) or all recordings of a folder ([`own`]), with its
+//! A data set is the tables of the shared data (`shared.rs`) or all recordings of a folder (`own.rs`), with its
 //! own two spaces. A cost is relative to the weak default, and was measured in turns with a reference, so that
 //! drift of the machine cancels.
 

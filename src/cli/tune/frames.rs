@@ -126,7 +126,11 @@ fn of_tiles(frame: usize, before: Option<BuildParams>, done: &HybridFrame, metri
     let record = FrameRecord {
         frame,
         config: described(&params),
-        build_ms: Some(milliseconds(own.build)),
+        build_ms: Some(milliseconds(match probed {
+            // The incumbent may have been built anew in the same frame.
+            Some(Ok(probed)) => probed.times.build,
+            _ => own.build,
+        })),
         render_ms: Some(milliseconds(own.render)),
         cost_ms: match probed {
             Some(Ok(probed)) => Some(probed.times.cost(metric) * 1e3),
