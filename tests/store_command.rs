@@ -175,3 +175,28 @@ fn a_run_on_tiles_remembers_what_it_tried() {
     let other = ["--policy", "paper"];
     assert!(!run(&other).contains("earlier runs"));
 }
+
+#[test]
+fn the_paper_s_policy_takes_what_is_predicted_from_other_states() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| tune(folder.path(), args);
+    // Nothing is known: a search.
+    assert!(run(&["--predict", "nearest"]).contains("fell on a search"));
+    // Another view: its nearest state is that of the first run. Of ten seeds nine take it, on average.
+    let view = ["--fov", "50", "--seed", "5"];
+    for predictor in ["nearest", "value"] {
+        let said = run(&[&view[..], &["--predict", predictor]].concat());
+        assert!(
+            said.contains("predicted from") || said.contains("fell on a search"),
+            "{said}"
+        );
+    }
+    let said: Vec<String> = ["1", "2", "3", "4"]
+        .iter()
+        .map(|seed| run(&["--fov", "40", "--predict", "nearest", "--seed", seed]))
+        .collect();
+    assert!(
+        said.iter().any(|said| said.contains("predicted from")),
+        "{said:?}"
+    );
+}

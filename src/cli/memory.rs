@@ -9,7 +9,7 @@ use std::{
 use raywright::{
     bvh::{BuildParams, PARAMETERS},
     tracer::Indicators,
-    tune::{Memory, ParameterSpace, Settings, described},
+    tune::{Memory, ParameterSpace, Settings, described, indicator_facts},
     tuner::store::{Fact, Facts, Machine, Scene, Store, SyncPolicy, WriterId},
 };
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
@@ -87,10 +87,7 @@ fn scene(base: &BuildParams, fixed: &[&str], stage: &Stage, settings: &Settings)
             Fact::from(i64::from(settings.path_length)),
         ),
     ]);
-    let indicators = Indicators::of(scene, &camera);
-    for (name, value) in indicators.named() {
-        facts.insert(format!("indicator {name}"), Fact::from(value));
-    }
+    facts.extend(indicator_facts(&Indicators::of(scene, &camera)));
     // What is not searched is part of what is measured.
     let is_fixed = |name: &str| {
         let parameter = PARAMETERS.iter().find(|p| p.name == name);

@@ -26,10 +26,10 @@ use raywright::{
     },
     tracer::{Indicators, Integrator},
     tune::{
-        self, Comparison, Hybrid, Memory, Metric, ParameterSpace, Session, Settings, SpaceAxes,
-        WallClock, milliseconds,
+        self, Comparison, Hybrid, Memory, Metric, ParameterSpace, PredictorKind, Session, Settings,
+        SpaceAxes, WallClock, milliseconds,
     },
-    tuner::{SEARCH_NAMES, Search, search_by_name},
+    tuner::{SEARCH_NAMES, Search, predict::Step, search_by_name},
 };
 
 use frames::Frames;
@@ -94,6 +94,14 @@ impl Policy {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Predict {
+    /// The best configuration of the nearest state
+    Nearest,
+    /// The configuration of the highest value, learned as in the paper
+    Value,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Space {
     /// One for each parameter, as in the paper
     Printed,
@@ -130,6 +138,10 @@ pub(crate) struct TuneArgs {
     /// How frames are used
     #[arg(long, value_enum, default_value_t = Policy::Hybrid)]
     policy: Policy,
+    /// With the policy paper and a store: take what this predictor names for the state of the scene, from what
+    /// is known of all scenes, and search with a small probability only
+    #[arg(long, value_enum, requires = "store")]
+    predict: Option<Predict>,
     /// The axes of the search; canonical with the policy hybrid, printed otherwise
     #[arg(long, value_enum)]
     space: Option<Space>,
@@ -188,6 +200,7 @@ impl TuneArgs {
             metric: MetricOption::Total,
             frames_per_tree: NonZeroU32::MIN,
             policy: Policy::Hybrid,
+            predict: None,
             space: None,
             portfolio: false,
             store: None,
@@ -257,8 +270,19 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     let world = &stage.world;
     let (camera, clock) = (stage.camera, WallClock::start());
     let starts = tune::portfolio(&base);
-    let mut frames = match args.policy {
-        Policy::Hybrid | Policy::Default => {
+    let predicted = match (args.predict, &memory) {
+        (Some(predict), Some(memory)) if args.policy == Policy::Paper => {
+            predicted(predict, memory, &space, &stage, &settings)?
+        }
+        _ => None,
+    };
+    let mut frames = match (args.policy, predicted) {
+        (_, Some(params)) => {
+            let search = || search_named("random");
+            let hybrid = Hybrid::new(world, camera, settings, space, &params, search, clock)?;
+            Frames::Tiles(hybrid.frozen())
+        }
+        (Policy::Hybrid | Policy::Default, None) => {
             let search = args.search();
             let hybrid = Hybrid::new(
                 world,
@@ -274,7 +298,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
                 _ => hybrid.with_starts(&starts).with_known(known),
             })
         }
-        Policy::Paper => {
+        (Policy::Paper, None) => {
             let search = search_named(&args.search());
             let session = Session::new(world, camera, settings, space, search, clock)?;
             let session = session.with_known(known)?;
@@ -350,6 +374,32 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     } else {
         Err(Failure::Interrupted)
     }
+}
+
+/// What a predictor names for the state of the scene; `None` if it is to be searched.
+fn predicted(
+    predict: Predict,
+    memory: &Memory,
+    space: &ParameterSpace,
+    stage: &Stage,
+    settings: &Settings,
+) -> Result<Option<BuildParams>, Failure> {
+    let kind = match predict {
+        Predict::Nearest => PredictorKind::NearestNeighbour,
+        Predict::Value => PredictorKind::ValueFunction,
+    };
+    let known = memory.states(space.space(), settings.metric)?;
+    let state = Indicators::of(stage.world.scene(), &stage.camera);
+    let step = tune::decide(kind, &known, space.space(), state.values(), settings.seed)?;
+    let Step::Exploit(point) = step else {
+        output::note("note: the choice fell on a search");
+        return Ok(None);
+    };
+    output::note(format_args!(
+        "note: all frames with what is predicted from {} outcomes",
+        known.len()
+    ));
+    Ok(Some(space.params(&space.space().decode(&point))))
 }
 
 fn header(args: &TuneArgs, stage: &Stage, settings: &Settings) -> RunHeader {

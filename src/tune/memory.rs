@@ -5,18 +5,41 @@
 //! is known as well; times are kept apart by build and rendering, so that a run may have another metric
 //! than those before. Times of another machine are never told: [`Query`] leaves them out.
 
+use raywright_tracer::{INDICATORS, Indicators};
 use raywright_tuner::{
     Config, Outcome, Space, SpaceError, Trial,
     store::{
-        Machine, Query, Records, Scene, SpaceFacts, Stamp, Store, StoreError, TrialOpen,
-        TrialOutcome, Writer,
+        Fact, Facts, Machine, Query, Records, Scene, SpaceFacts, Stamp, Store, StoreError,
+        TrialOpen, TrialOutcome, Writer,
     },
 };
 
-use super::{FrameTimes, Metric};
+use super::{FrameTimes, KnownState, Metric};
 
 /// Seconds of building and rendering, as measures of outcomes.
 const MEASURES: [&str; 2] = ["build_s", "render_s"];
+
+/// What the names of facts of a scene begin with that are its indicators.
+const INDICATOR: &str = "indicator ";
+
+/// Facts of a scene that only describe it.
+const DESCRIPTIONS: [&str; 2] = ["name", "triangles"];
+
+/// Indicators as facts of a scene, which [`Memory::states`] reads.
+pub fn indicator_facts(indicators: &Indicators) -> impl Iterator<Item = (String, Fact)> {
+    let named = indicators.named();
+    named.map(|(name, value)| (format!("{INDICATOR}{name}"), Fact::from(value)))
+}
+
+/// The state of a scene; `None` if an indicator is missing.
+fn state_of(scene: &Scene) -> Option<Vec<f64>> {
+    let value = |name: &str| match scene.facts.get(&format!("{INDICATOR}{name}"))? {
+        Fact::Real(value) => Some(*value),
+        Fact::Integer(value) => Some(*value as f64),
+        _ => None,
+    };
+    INDICATORS.iter().map(|(name, ..)| value(name)).collect()
+}
 
 /// A log of one session, and what earlier ones left.
 #[derive(Debug)]
@@ -89,6 +112,44 @@ impl Memory {
             known.push((measured.trial.config_in(space)?, outcome));
         }
         Ok(known)
+    }
+
+    /// What was measured on this machine in any scene with this space and these settings, each in its state,
+    /// with a cost by `metric`. Failures have no cost and are left out.
+    ///
+    /// # Errors
+    /// If a configuration is none of the space.
+    pub fn states(&self, space: &Space, metric: Metric) -> Result<Vec<KnownState>, SpaceError> {
+        let query = Query::new(self.machine.id.clone()).with_space(self.space.id.clone());
+        let settings = |scene: &Scene| -> Facts {
+            let facts = scene.facts.iter().filter(|(name, _)| {
+                !name.starts_with(INDICATOR) && !DESCRIPTIONS.contains(&name.as_str())
+            });
+            facts
+                .map(|(name, fact)| (name.clone(), fact.clone()))
+                .collect()
+        };
+        let own = settings(&self.scene);
+        let mut states = Vec::new();
+        for measured in self.records.outcomes(&query) {
+            let Some(scene) = self.records.scene(&measured.trial.scene) else {
+                continue;
+            };
+            let is_done = matches!(measured.outcome.outcome, Outcome::Done { .. });
+            if let (true, Some(cost), Some(state)) = (
+                is_done && settings(scene) == own,
+                Self::cost(measured.outcome, metric).filter(|cost| *cost > 0.0),
+                state_of(scene),
+            ) {
+                let config = measured.trial.config_in(space)?;
+                states.push(KnownState {
+                    state,
+                    config,
+                    cost,
+                });
+            }
+        }
+        Ok(states)
     }
 
     /// What an outcome of such a run costs by `metric`, in seconds; `None` if it does not tell.

@@ -7,6 +7,7 @@
 
 mod canonical;
 mod comparison;
+mod decision;
 mod hybrid;
 #[cfg(feature = "store")]
 mod memory;
@@ -19,9 +20,10 @@ mod space;
 mod stage;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
+pub use decision::{KnownState, PredictorKind, decide, state_features};
 pub use hybrid::{Candidate, Hybrid, HybridFrame, Probed};
 #[cfg(feature = "store")]
-pub use memory::Memory;
+pub use memory::{Memory, indicator_facts};
 pub use metric::Metric;
 pub use portfolio::portfolio;
 pub use probe::{Costs, Decision, Pair, ProbeRatio};
