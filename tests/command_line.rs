@@ -406,6 +406,8 @@ fn policies_use_frames_in_their_own_way() {
             "1",
             "--frames-per-tree",
             "3",
+            "--overhead",
+            "1e9",
         ];
         let output = raywright(folder.path(), &args);
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));

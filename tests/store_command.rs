@@ -153,6 +153,7 @@ fn a_run_on_tiles_remembers_what_it_tried() {
         let output = Command::new(env!("CARGO_BIN_EXE_raywright"))
             .args(["tune", "interior", "--frames", "5", "--rounds", "1"])
             .args(["--width", "64", "--height", "48", "--store", "memory"])
+            .args(["--overhead", "1e9"])
             .args(args)
             .current_dir(folder.path())
             .output()

@@ -107,8 +107,9 @@ fn gains_have_a_row_for_each_run_and_goals() {
     assert_eq!(rows.len(), 1 + 2 * 2 * 2);
     assert!(rows.iter().all(|row| row.len() == rows[0].len()));
     for row in &rows[1..] {
-        // Three frames of four are trials; the ratios are those of frames, whatever they are.
-        assert_eq!((row[0], row[4]), ("interior", "3"));
+        assert_eq!(row[0], "interior");
+        let tried: usize = row[4].parse().unwrap();
+        assert!((1..=3).contains(&tried));
         assert!(
             row[6..9]
                 .iter()

@@ -40,6 +40,17 @@ use super::{
     scene::{SceneOptions, Stage},
 };
 
+/// Share of all time that trials take here: a run is for the search, and its frames are few.
+const SEARCH_OVERHEAD: f64 = 0.5;
+
+/// A share that is at least 0.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if share >= 0.0 => Ok(share),
+        _ => Err("a number from 0 on is wanted".into()),
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum MetricOption {
     /// Time to render: the tree serves many frames
@@ -138,6 +149,10 @@ pub(crate) struct TuneArgs {
     /// How frames are used
     #[arg(long, value_enum, default_value_t = Policy::Hybrid)]
     policy: Policy,
+    /// The most that trials may take of all time with the policy hybrid, as a share; what would be one too
+    /// many waits. 1 and more: none waits long
+    #[arg(long, default_value_t = SEARCH_OVERHEAD, value_parser = share)]
+    overhead: f64,
     /// With the policy paper and a store: take what this predictor names for the state of the scene, from what
     /// is known of all scenes, and search with a small probability only
     #[arg(long, value_enum, requires = "store")]
@@ -200,6 +215,7 @@ impl TuneArgs {
             metric: MetricOption::Total,
             frames_per_tree: NonZeroU32::MIN,
             policy: Policy::Hybrid,
+            overhead: SEARCH_OVERHEAD,
             predict: None,
             space: None,
             portfolio: false,
@@ -295,7 +311,10 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
             )?;
             Frames::Tiles(match args.policy {
                 Policy::Default => hybrid.frozen(),
-                _ => hybrid.with_starts(&starts).with_known(known),
+                _ => hybrid
+                    .with_starts(&starts)
+                    .with_known(known)
+                    .with_overhead_limit(args.overhead),
             })
         }
         (Policy::Paper, None) => {

@@ -9,6 +9,8 @@
 //! frames take longer or shorter than they did, one probe of the second best tells a change of the scene from
 //! a change of the machine: only in the one the ratio of the two changes, and the search begins again.
 //!
+//! Trials take at most a given share of all time: what would be one too many waits for frames of the incumbent.
+//!
 //! Costs that the search sees are ratios of paired tiles, chained from incumbent to incumbent, times what the
 //! first frame cost: the drift of a machine is in none of them.
 //!
@@ -38,6 +40,9 @@ use frame::Frame;
 /// Gain that is not worth a trial, as a share of the cost; and proposals in a row that promise less.
 const LEAST_GAIN: f64 = 0.005;
 const QUIET_PROPOSALS: u32 = 5;
+
+/// The most that trials take of all time, as a share, if nothing else is said.
+pub const DEFAULT_OVERHEAD: f64 = 0.1;
 
 /// New candidates in a row without a new incumbent after which nothing more is tried.
 const PATIENCE: u32 = 12;
@@ -163,6 +168,11 @@ pub struct Hybrid<'a, C> {
     /// that of the incumbent.
     check: Option<(Config, f64)>,
     begun: u64,
+    /// The most that trials may take of all time, as a share.
+    overhead_limit: f64,
+    /// Seconds that trials took beyond frames of the incumbent alone, and seconds of all frames.
+    overhead: f64,
+    spent: f64,
 }
 
 impl<'a, C: Clock> Hybrid<'a, C> {
@@ -205,6 +215,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             detector: ChangeDetector::new(LEAST_NOISE),
             check: None,
             begun: 0,
+            overhead_limit: DEFAULT_OVERHEAD,
+            overhead: 0.0,
+            spent: 0.0,
         })
     }
 
@@ -212,6 +225,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     #[must_use]
     pub fn frozen(mut self) -> Self {
         (self.is_searching, self.is_frozen) = (false, true);
+        self
+    }
+
+    /// The same run, in which trials (builds and slower tiles) take at most this share of all time so far; a
+    /// trial that would be one too many waits. [`DEFAULT_OVERHEAD`] otherwise; infinite: nothing waits.
+    #[must_use]
+    pub fn with_overhead_limit(mut self, share: f64) -> Self {
+        self.overhead_limit = share;
         self
     }
 
@@ -257,7 +278,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let Some(mut incumbent) = self.incumbent.take() else {
             return self.first_frame(frame, start, begins);
         };
+        let usual = self.render_time();
         let built = self.rebuild(&mut incumbent);
+        let rebuild = built.as_ref().map_or(0.0, Duration::as_secs_f64);
         let trial = built.and_then(|build| Ok((build, self.next_trial(&incumbent)?)));
         let tried = trial.and_then(|(build, trial)| match trial {
             Some(trial) => {
@@ -282,9 +305,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.watch(&frame.times);
         add_frame(&mut self.film, &frame.film);
         self.finished += 1;
+        let time = self.stage.now() - start;
+        self.spent += time.as_secs_f64();
+        if candidate.is_some() {
+            self.overhead += (time.as_secs_f64() - rebuild - usual).max(0.0);
+        }
         Ok(Some(HybridFrame {
             candidate,
-            time: self.stage.now() - start,
+            time,
             build,
             incumbent: params,
             incumbent_cost: self.incumbent_cost().unwrap_or(0.0),
@@ -330,9 +358,11 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.begin_starts(&starts);
         add_frame(&mut self.film, &frame.film);
         self.finished += 1;
+        let time = self.stage.now() - start;
+        self.spent = time.as_secs_f64();
         Ok(Some(HybridFrame {
             candidate: None,
-            time: self.stage.now() - start,
+            time,
             build,
             incumbent: self.first,
             incumbent_cost: self.unit,
@@ -399,7 +429,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
 
     /// What is tried in the next frame.
     fn next_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
-        if self.is_frozen {
+        if self.is_frozen || self.overhead > self.overhead_limit * self.spent {
             return Ok(None);
         }
         if let Some((config, _)) = &self.check {

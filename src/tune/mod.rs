@@ -21,7 +21,7 @@ mod stage;
 
 pub use comparison::{Baseline, Comparison, Measurement, milliseconds};
 pub use decision::{KnownState, PredictorKind, decide, state_features};
-pub use hybrid::{Candidate, Hybrid, HybridFrame, Probed};
+pub use hybrid::{Candidate, DEFAULT_OVERHEAD, Hybrid, HybridFrame, Probed};
 #[cfg(feature = "store")]
 pub use memory::{Memory, indicator_facts};
 pub use metric::Metric;

@@ -13,8 +13,8 @@ use raywright::{
     imaging::CancelToken,
     tracer::Integrator,
     tune::{
-        Decision, Hybrid, Metric, ParameterSpace, Settings, SpaceAxes, WallClock, described,
-        portfolio,
+        DEFAULT_OVERHEAD, Decision, Hybrid, Metric, ParameterSpace, Settings, SpaceAxes, WallClock,
+        described, portfolio,
     },
     tuner::{GaussianProcess, Search},
 };
@@ -48,6 +48,9 @@ pub(crate) struct GainsArgs {
     /// Scattering events of a path, K
     #[arg(long, default_value_t = Integrator::DEFAULT_PATH_LENGTH)]
     path_length: u32,
+    /// The most that trials may take of all time, as a share
+    #[arg(long, default_value_t = DEFAULT_OVERHEAD)]
+    overhead: f64,
     /// What is made small
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Feedback::Render, Feedback::Total])]
     metrics: Vec<Feedback>,
@@ -169,7 +172,9 @@ fn one(
     let (world, camera) = (&stage.world, stage.camera);
     let clock = WallClock::start();
     let hybrid = Hybrid::new(world, camera, settings, space, &strong, search, clock)?;
-    let mut hybrid = hybrid.with_starts(&portfolio(&strong));
+    let mut hybrid = hybrid
+        .with_starts(&portfolio(&strong))
+        .with_overhead_limit(args.overhead);
     let (mut tried, mut accepted) = (0, 0);
     let (mut seconds, mut renders) = (0.0, Vec::new());
     for _ in 0..args.frames {

@@ -70,7 +70,9 @@ fn hybrid<'p, C: Clock>(
         search,
         clock,
     );
-    run.unwrap().with_starts(&portfolio(&base))
+    run.unwrap()
+        .with_starts(&portfolio(&base))
+        .with_overhead_limit(f64::INFINITY)
 }
 
 /// The same frames by one tree.
@@ -229,4 +231,20 @@ fn what_is_known_is_scaled_to_the_machine_and_not_tried_before_it_is_better() {
         let tried = frame.candidate.map(|candidate| candidate.params);
         assert_eq!(tried == Some(other), is_tried, "{tried:?}");
     }
+}
+
+#[test]
+fn trials_wait_until_there_is_time_for_them() {
+    let place = place("interior");
+    let tried = |limit: f64| -> usize {
+        let clock = OddClock(AtomicU64::new(1), 1);
+        let run = hybrid(&place, Metric::Render, &BuildParams::default(), clock);
+        let mut run = run.with_overhead_limit(limit);
+        let frames = (0..20).map(|_| run.frame(&CancelToken::new()).unwrap().unwrap());
+        frames.filter(|frame| frame.candidate.is_some()).count()
+    };
+    assert_eq!(tried(f64::INFINITY), 19);
+    // The first costs nothing yet.
+    assert_eq!(tried(0.0), 1);
+    assert!(tried(0.02) < 19);
 }
