@@ -24,6 +24,9 @@ const SPEED_DECAY: f64 = 0.99;
 /// Novelty up to which a frame tells the speed of the machine, and how noisy times are.
 const KNOWN: f64 = 0.1;
 
+/// A sample that costs more seconds is a fault of the clock.
+const MOST_COST: f64 = 1.0;
+
 /// Frames over which ratios of counts are averaged.
 const RATIO_MEMORY: f64 = 10.0;
 
@@ -90,7 +93,7 @@ impl FramePredictor {
         let first_cost = *self.first_cost.get_or_insert(cost);
         if let Some(model) = &mut self.cost {
             let target = match self.params.target {
-                CostTarget::Cost => cost / COST_UNIT,
+                CostTarget::Cost => cost.min(MOST_COST) / COST_UNIT,
                 CostTarget::LogRatio => {
                     let limit = self.params.unit.most_log_cost();
                     (cost / first_cost).ln().clamp(-limit, limit)
