@@ -2,7 +2,7 @@
 //! reference, so that searches and predictors can be judged later without the machine.
 //!
 //! Invariants: a figure stands beside that of the reference from the same moments; all trees render the
-//! same samples; the random configurations are a function of space and seed.
+//! same samples; times to render are what threads worked, so that another program is in none of them; the random configurations are a function of space and seed.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use raywright_tuner::{Outcome, Random, Tuner};
 
 use super::{
     ParameterSpace, SLOWEST_TRIAL, SessionError, Settings,
-    stage::{Clock, Rendered, Stage},
+    stage::{Clock, Stage},
 };
 
 /// The tree of the reference is built once more after so many configurations.
@@ -47,7 +47,7 @@ pub struct RecordedTree {
 /// Medians over repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordedFrame {
-    /// Time to render a sample of every pixel; `None` if it was given up, being more than
+    /// Time that threads worked to render a sample of every pixel, all together; `None` if it was given up, being more than
     /// [`SLOWEST_TRIAL`] times slower than the reference.
     pub render: Option<Duration>,
     /// The same with the reference, in turns.
@@ -88,7 +88,13 @@ impl<'a, C: Clock> Recorder<'a, C> {
         }
         let first = cameras.first().ok_or(SessionError::NoCamera)?;
         let mut stage = Stage::new(world, *first, settings, clock);
-        let (tree, build) = stage.build(reference).map_err(SessionError::Build)?;
+        let (tree, mut build) = stage.build(reference).map_err(SessionError::Build)?;
+        // A build that finds no memory of another is no measure.
+        for _ in 0..2 {
+            let (other, time) = stage.build(reference).map_err(SessionError::Build)?;
+            stage.recycle(other);
+            build = time;
+        }
         Ok(Self {
             stage,
             cameras: cameras.to_vec(),
@@ -163,23 +169,19 @@ impl<'a, C: Clock> Recorder<'a, C> {
             let (mut own, mut references) = (Vec::new(), Vec::new());
             // The same samples for all configurations: others take other times.
             for sample in 0..self.repeats as u32 {
-                let rendered =
+                let begun = self.stage.now();
+                let reference =
                     self.stage
-                        .render(&self.reference_tree, sample, Duration::MAX, cancel)?;
-                let Rendered::Finished {
-                    time: reference, ..
-                } = rendered
-                else {
+                        .work(&self.reference_tree, sample, Duration::MAX, cancel)?;
+                let Some(reference) = reference else {
                     return Ok(None);
                 };
+                let limit = (self.stage.now() - begun) * SLOWEST_TRIAL;
                 references.push(reference);
-                match self
-                    .stage
-                    .render(tree, sample, reference * SLOWEST_TRIAL, cancel)?
-                {
-                    Rendered::Finished { time, .. } => own.push(time),
-                    Rendered::TooSlow => break,
-                    Rendered::Cancelled => return Ok(None),
+                match self.stage.work(tree, sample, limit, cancel)? {
+                    Some(time) => own.push(time),
+                    None if cancel.is_cancelled() => return Ok(None),
+                    None => break,
                 }
             }
             let is_whole = own.len() == self.repeats;

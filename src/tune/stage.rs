@@ -288,6 +288,24 @@ impl<'a, C: Clock> Stage<'a, C> {
         Ok(times.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// Renders one sample of every pixel and forgets it: how long threads worked for it, all together. `None`
+    /// if `limit` has passed on the wall before, or it was cancelled.
+    pub(super) fn work(
+        &self,
+        tree: &Bvh,
+        sample: u32,
+        limit: Duration,
+        cancel: &CancelToken,
+    ) -> Result<Option<Duration>, SessionError> {
+        let mut film = self.film()?;
+        let times = self.render_tiles(&mut film, sample, limit, cancel, |_| Some(tree))?;
+        let seconds = times.iter().map(|(_, time)| time).sum();
+        let is_whole = times.len() == self.tiles();
+        Ok(Duration::try_from_secs_f64(seconds)
+            .ok()
+            .filter(|_| is_whole))
+    }
+
     /// Time since a moment that does not change.
     pub(super) fn now(&self) -> Duration {
         self.clock.now()
