@@ -190,7 +190,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         search: impl Fn() -> Box<dyn Search> + Send + Sync + 'static,
         clock: C,
     ) -> Result<Self, SessionError> {
-        let stage = Stage::checked(world, camera, settings, clock)?;
+        let stage = Stage::new(world, camera, settings, clock)?;
         let film = stage.film()?;
         let tuner = Tuner::new(space.space().clone(), search(), settings.seed);
         Ok(Self {
@@ -268,7 +268,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         cancel: &CancelToken,
         begins: impl FnOnce(&Trial),
     ) -> Result<Option<HybridFrame>, SessionError> {
-        let start = self.stage.now();
+        let mut start = self.stage.now();
         let mut frame = Frame::new(
             self.stage.film()?,
             self.stage.tiles(),
@@ -284,7 +284,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let trial = built.and_then(|build| Ok((build, self.next_trial(&incumbent)?)));
         let tried = trial.and_then(|(build, trial)| match trial {
             Some(trial) => {
-                begins(&trial);
+                start += self.time_of(|| begins(&trial));
                 let tried = self.try_candidate(&mut frame, &mut incumbent, &trial)?;
                 Ok(tried.map(|(candidate, own)| (Some(candidate), build + own)))
             }
@@ -323,14 +323,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     fn first_frame(
         &mut self,
         mut frame: Frame<'_>,
-        start: Duration,
+        mut start: Duration,
         begins: impl FnOnce(&Trial),
     ) -> Result<Option<HybridFrame>, SessionError> {
         let config = self.config(&self.first)?;
         let starts = self.starts.iter().map(|params| self.config(params));
         let starts: Vec<Config> = starts.collect::<Result<_, _>>()?;
         let trial = self.tuner.ask_for(&config);
-        begins(&trial);
+        start += self.time_of(|| begins(&trial));
         let (tree, build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
         self.trace_rest(&mut frame, &tree)?;
         if !frame.is_done() {
@@ -355,7 +355,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.unit = self.incumbent_cost().unwrap_or(0.0);
         self.tell(&trial, Outcome::Done { cost: self.unit })?;
         self.tell_known(&trial.canonical)?;
-        self.begin_starts(&starts);
+        for config in starts {
+            self.tuner.add_new_start(config);
+        }
         add_frame(&mut self.film, &frame.film);
         self.finished += 1;
         let time = self.stage.now() - start;
@@ -367,6 +369,13 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             incumbent: self.first,
             incumbent_cost: self.unit,
         }))
+    }
+
+    /// How long something takes that is no part of a frame: a log that is written, say.
+    fn time_of(&self, run: impl FnOnce()) -> Duration {
+        let begun = self.stage.now();
+        run();
+        self.stage.now() - begun
     }
 
     /// The configuration of some parameters.
@@ -397,19 +406,6 @@ impl<'a, C: Clock> Hybrid<'a, C> {
                 .map_err(SessionError::Tell)?;
         }
         Ok(())
-    }
-
-    /// Gives the tuner those starts that are not known.
-    fn begin_starts(&mut self, starts: &[Config]) {
-        let records = self.tuner.records().iter();
-        let mut known: Vec<Config> = records.map(|record| record.canonical.clone()).collect();
-        for config in starts {
-            let canonical = self.space.space().canonical(config);
-            if !known.contains(&canonical) {
-                known.push(canonical);
-                self.tuner.add_start(config.clone());
-            }
-        }
     }
 
     /// Builds the tree of the incumbent anew if its time has come.
@@ -522,7 +518,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             // A cost that was told before can be told again.
             let _ = self.tuner.tell_known(&config, Outcome::Done { cost });
         }
-        self.begin_starts(&starts);
+        for config in starts {
+            self.tuner.add_new_start(config);
+        }
         self.probed.clear();
         (self.quiet, self.fruitless) = (0, 0);
         self.is_searching = true;

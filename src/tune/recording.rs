@@ -80,14 +80,11 @@ impl<'a, C: Clock> Recorder<'a, C> {
         repeats: usize,
         clock: C,
     ) -> Result<Self, SessionError> {
-        if !settings.isa.is_available() {
-            return Err(SessionError::Isa(settings.isa));
-        }
         for camera in cameras {
             camera.validate().map_err(SessionError::Camera)?;
         }
         let first = cameras.first().ok_or(SessionError::NoCamera)?;
-        let mut stage = Stage::new(world, *first, settings, clock);
+        let mut stage = Stage::new(world, *first, settings, clock)?;
         let (tree, mut build) = stage.build(reference).map_err(SessionError::Build)?;
         // A build that finds no memory of another is no measure.
         for _ in 0..2 {

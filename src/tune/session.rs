@@ -84,7 +84,7 @@ impl<'a, C: Clock> Session<'a, C> {
         search: Box<dyn Search>,
         clock: C,
     ) -> Result<Self, SessionError> {
-        let stage = Stage::checked(world, camera, settings, clock)?;
+        let stage = Stage::new(world, camera, settings, clock)?;
         let film = stage.film()?;
         let tuner = Tuner::new(space.space().clone(), search, settings.seed);
         Ok(Self {
@@ -123,15 +123,8 @@ impl<'a, C: Clock> Session<'a, C> {
     /// # Errors
     /// If parameters are not valid.
     pub fn with_starts(mut self, starts: &[BuildParams]) -> Result<Self, SpaceFault> {
-        let records = self.tuner.records().iter();
-        let mut known: Vec<Config> = records.map(|record| record.canonical.clone()).collect();
         for params in starts {
-            let config = self.space.config(params)?;
-            let canonical = self.space.space().canonical(&config);
-            if !known.contains(&canonical) {
-                known.push(canonical);
-                self.tuner = self.tuner.with_start(config);
-            }
+            self.tuner.add_new_start(self.space.config(params)?);
         }
         Ok(self)
     }

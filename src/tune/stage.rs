@@ -146,7 +146,7 @@ impl<'a, C: Clock> Stage<'a, C> {
     ///
     /// # Errors
     /// If camera, picture size or instruction set cannot be used.
-    pub(super) fn checked(
+    pub(super) fn new(
         world: &'a World,
         camera: Camera,
         settings: Settings,
@@ -156,7 +156,13 @@ impl<'a, C: Clock> Stage<'a, C> {
         if !settings.isa.is_available() {
             return Err(SessionError::Isa(settings.isa));
         }
-        let stage = Self::new(world, camera, settings, clock);
+        let stage = Self {
+            world,
+            camera,
+            settings,
+            clock,
+            workspace: BuildWorkspace::default(),
+        };
         stage.film()?;
         Ok(stage)
     }
@@ -164,17 +170,6 @@ impl<'a, C: Clock> Stage<'a, C> {
     /// Shows another scene from now on.
     pub(super) fn show(&mut self, world: &'a World, camera: Camera) {
         (self.world, self.camera) = (world, camera);
-    }
-
-    /// A stage; camera and instruction set have been looked at.
-    pub(super) fn new(world: &'a World, camera: Camera, settings: Settings, clock: C) -> Self {
-        Self {
-            world,
-            camera,
-            settings,
-            clock,
-            workspace: BuildWorkspace::default(),
-        }
     }
 
     /// Builds a tree; the time that it took.

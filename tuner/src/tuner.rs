@@ -82,12 +82,20 @@ impl Tuner {
         self
     }
 
-    /// One more known-good configuration, asked after those that are given already.
+    /// One more start, unless its canonical form is one already or was measured.
     ///
     /// # Panics
     ///
     /// As [`with_start`](Tuner::with_start).
-    pub fn add_start(&mut self, config: Config) {
+    pub fn add_new_start(&mut self, config: Config) {
+        let canonical = self.space.canonical(&config);
+        let is_start = |start: &Config| self.space.canonical(start) == canonical;
+        if self.database.get(&canonical).is_none() && !self.starts.iter().any(is_start) {
+            self.add_start(config);
+        }
+    }
+
+    fn add_start(&mut self, config: Config) {
         if let Err(error) = self.space.check(&config) {
             panic!("not a start of this space: {error}");
         }

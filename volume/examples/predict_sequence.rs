@@ -14,7 +14,7 @@ use cpu_time::ProcessTime;
 use raywright_volume::{
     CastOptions, EstimateMethod, Estimator, FramePredictor, LoadOptions, Outlook, PredictorParams,
     Quality, Raycaster, View, Work, WorkClock, load_volume,
-    predict::{CostTarget, FeatureForm, FeatureScales, SampleUnit, WorkCosts},
+    predict::{FeatureForm, FeatureScales, SampleUnit, WorkCosts},
     sequence::script::{Start, Views, thirty_seconds},
 };
 
@@ -130,7 +130,6 @@ fn predictors() -> Vec<(&'static str, PredictorParams)> {
         ("paper, raw features", raw),
         ("paper", PredictorParams::paper()),
         ("plus", plus),
-        ("plus, cost as such", with(|p| p.target = CostTarget::Cost)),
         (
             "plus, unit corrected",
             with(|p| p.unit = SampleUnit::Corrected),

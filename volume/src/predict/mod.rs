@@ -31,7 +31,7 @@ pub use additive::{AdditiveModel, Counts, WorkCosts};
 pub use features::{FEATURES, FeatureForm, FeatureScales};
 pub use krls::{Krls, KrlsError, KrlsParams, KrlsPrediction, Learned};
 pub use outlook::Outlook;
-pub use params::{CostTarget, PredictorParams, SampleUnit};
+pub use params::{PredictorParams, SampleUnit};
 pub use prediction::{FrameModel, Lesson, Prediction};
 pub use predictor::FramePredictor;
 pub use quality::{PixelsPerRay, Quality};

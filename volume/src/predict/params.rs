@@ -2,16 +2,6 @@
 
 use super::{FeatureForm, FeatureScales, KrlsParams, PredictError, WorkCosts};
 
-/// What the kernel model is taught.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum CostTarget {
-    /// The cost of a sample, as in the paper.
-    Cost,
-    /// The logarithm of its ratio to that of the first frame: errors are relative, costs positive.
-    LogRatio,
-}
-
 /// What the cost of a sample is the cost of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -34,8 +24,6 @@ pub struct PredictorParams {
     pub features: FeatureForm,
     /// The kernel model of the cost of a sample; `None`: the additive model alone predicts.
     pub cost: Option<KrlsParams>,
-    /// What it is taught.
-    pub target: CostTarget,
     /// What it is the cost of.
     pub unit: SampleUnit,
     /// The kernel model of β = log(samples taken / samples estimated); `None`: β is 0.
@@ -59,7 +47,6 @@ impl PredictorParams {
         Self {
             features: FeatureForm::Scaled(FeatureScales::paper()),
             cost: Some(KrlsParams::default()),
-            target: CostTarget::Cost,
             unit: SampleUnit::Estimated,
             bias: None,
             speed_memory: None,
@@ -77,7 +64,6 @@ impl PredictorParams {
         Self {
             features: FeatureForm::Scaled(FeatureScales::default()),
             cost: Some(krls.with_forgetting(0.98)),
-            target: CostTarget::Cost,
             unit: SampleUnit::Weighted,
             bias: Some(krls.with_forgetting(0.98)),
             speed_memory: Some(5.0),

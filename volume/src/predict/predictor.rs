@@ -13,8 +13,8 @@
 use std::collections::VecDeque;
 
 use super::{
-    AdditiveModel, CostTarget, Counts, FEATURES, FrameModel, Krls, Lesson, Outlook, PixelsPerRay,
-    PredictError, Prediction, PredictorParams, Quality, SampleUnit,
+    AdditiveModel, Counts, FEATURES, FrameModel, Krls, Lesson, Outlook, PixelsPerRay, PredictError,
+    Prediction, PredictorParams, Quality, SampleUnit,
 };
 use crate::cast::Work;
 
@@ -35,11 +35,6 @@ const SAFE_QUANTILE: f64 = 0.95;
 const MAX_BIAS: f64 = 3.0;
 const MAX_SPEED: f64 = 2.0;
 
-/// Limit of the logarithm of a cost's ratio to that of the first frame. Where all work is weighed it is
-/// a few at most, and more is an odd frame.
-const MAX_LOG_COST: f64 = 20.0;
-const MAX_LOG_WEIGHTED: f64 = 2.5;
-
 /// Units of costs for the kernel model, seconds: numbers near 1.
 const COST_UNIT: f64 = 1e-9;
 
@@ -51,8 +46,6 @@ pub struct FramePredictor {
     cost: Option<Krls<FEATURES>>,
     bias: Option<Krls<FEATURES>>,
     additive: AdditiveModel,
-    /// Cost of a sample in the first frame.
-    first_cost: Option<f64>,
     /// log g.
     log_speed: f64,
     /// Logarithms of counted over expected rays, skips, lit samples.
@@ -83,7 +76,6 @@ impl FramePredictor {
             cost: params.cost.map(Krls::new).transpose()?,
             bias: params.bias.map(Krls::new).transpose()?,
             additive: AdditiveModel::new(params.cold_start, params.additive_memory),
-            first_cost: None,
             log_speed: 0.0,
             log_ratios: [0.0; 3],
             residuals: VecDeque::with_capacity(RESIDUALS),
@@ -105,7 +97,6 @@ impl FramePredictor {
         }
         self.volume_version = volume_version;
         self.additive = AdditiveModel::new(self.params.cold_start, self.params.additive_memory);
-        self.first_cost = None;
         self.log_speed = 0.0;
         self.log_ratios = [0.0; 3];
         self.residuals.clear();
@@ -219,24 +210,14 @@ impl FramePredictor {
         let additive_time = self.additive.predict(&counts);
         let (mut time, mut novelty, mut unknown) = (additive_time, 1.0, 0.0);
         if let Some(model) = &self.cost
-            && let Some(first_cost) = self.first_cost
             && samples > 0.0
         {
             let known = model.predict_with_deviation(&features)?;
-            let cost = match self.params.target {
-                CostTarget::Cost => known.mean * COST_UNIT,
-                CostTarget::LogRatio => {
-                    let limit = self.params.unit.most_log_cost();
-                    first_cost * known.mean.clamp(-limit, limit).exp()
-                }
-            };
-            // A cost that is learned as such may be predicted to be negative.
+            let cost = known.mean * COST_UNIT;
+            // Nothing learned is 0, and what is far from all that was learned may be negative.
             if cost > 0.0 {
                 novelty = known.novelty;
-                unknown = match self.params.target {
-                    CostTarget::Cost => known.deviation / known.mean,
-                    CostTarget::LogRatio => known.deviation,
-                };
+                unknown = known.deviation / known.mean;
                 let share = match self.params.fallback {
                     Some([low, high]) => ((novelty - low) / (high - low)).clamp(0.0, 1.0),
                     None => 0.0,
@@ -298,15 +279,6 @@ impl FramePredictor {
         costs.sort_by(f64::total_cmp);
         let index = (costs.len() as f64 * SAFE_QUANTILE) as usize;
         costs.get(index.min(costs.len().saturating_sub(1))).copied()
-    }
-}
-
-impl SampleUnit {
-    fn most_log_cost(self) -> f64 {
-        match self {
-            Self::Estimated | Self::Corrected => MAX_LOG_COST,
-            Self::Weighted => MAX_LOG_WEIGHTED,
-        }
     }
 }
 

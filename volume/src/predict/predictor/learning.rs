@@ -5,8 +5,8 @@
 use std::collections::VecDeque;
 
 use super::{
-    COST_UNIT, COSTS, CostTarget, Counts, FEATURES, FramePredictor, Lesson, MAX_SPEED, Outlook,
-    Parts, PredictError, Quality, RESIDUALS, Work, estimated,
+    COST_UNIT, COSTS, Counts, FEATURES, FramePredictor, Lesson, MAX_SPEED, Outlook, Parts,
+    PredictError, Quality, RESIDUALS, Work, estimated,
 };
 
 /// A measured time this many times the predicted one, or one over it, is an outlier.
@@ -90,16 +90,8 @@ impl FramePredictor {
             push(&mut self.costs, COSTS, usual_time / lit);
         }
         let cost = usual_time / prediction.samples;
-        let first_cost = *self.first_cost.get_or_insert(cost);
         if let Some(model) = &mut self.cost {
-            let target = match self.params.target {
-                CostTarget::Cost => cost.min(MOST_COST) / COST_UNIT,
-                CostTarget::LogRatio => {
-                    let limit = self.params.unit.most_log_cost();
-                    (cost / first_cost).ln().clamp(-limit, limit)
-                }
-            };
-            model.learn(&features, target)?;
+            model.learn(&features, cost.min(MOST_COST) / COST_UNIT)?;
         }
         Ok(if odd {
             Lesson::Outlier
