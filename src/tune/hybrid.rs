@@ -18,7 +18,9 @@
 //! and number of frames alone. A candidate that cannot be built or is hopeless costs its build and 1/32 of
 //! the tiles. Nothing here reads a clock but the stage's.
 
+mod change;
 mod frame;
+mod report;
 mod trial;
 
 use std::{collections::HashMap, fmt, time::Duration};
@@ -30,12 +32,12 @@ use raywright_tuner::{ChangeDetector, Config, Outcome, Search, Trial, Tuner};
 
 use super::{
     comparison::Comparison,
-    probe::{Decision, INTERRUPTED, ProbeRatio},
-    session::TrialFailure,
+    probe::ProbeRatio,
     space::ParameterSpace,
-    stage::{Clock, FrameTimes, SessionError, Settings, Stage, add_frame},
+    stage::{Clock, SessionError, Settings, Stage, add_frame},
 };
 use frame::Frame;
+pub use report::{Candidate, HybridFrame, Probed};
 
 /// Gain that is not worth a trial, as a share of the cost; and proposals in a row that promise less.
 const LEAST_GAIN: f64 = 0.005;
@@ -53,61 +55,8 @@ const MOST_PROBES: u32 = 3;
 /// Weight of the last frame in what a tile is expected to take.
 const FRESH: f64 = 0.2;
 
-/// A change of the ratio of two trees below this is none, as a logarithm.
-const SAME: f64 = 0.05;
-
 /// Standard deviation of the logarithm of the time of a frame that is taken for noise at least.
 const LEAST_NOISE: f64 = 0.01;
-
-/// Outcomes that are told again when the search begins again: the best.
-const KEPT: usize = 3;
-
-/// What one frame was.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct HybridFrame {
-    /// What was tried; `None`: the incumbent alone.
-    pub candidate: Option<Candidate>,
-    /// Time of the frame, builds and all.
-    pub time: Duration,
-    /// Its part in which trees were built.
-    pub build: Duration,
-    /// The parameters of the incumbent after the frame.
-    pub incumbent: BuildParams,
-    /// What a frame with the incumbent costs by the metric, in seconds, at the speed of these days.
-    pub incumbent_cost: f64,
-}
-
-/// A candidate, and what became of it.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Candidate {
-    /// Its parameters.
-    pub params: BuildParams,
-    /// Why it was tried.
-    pub reason: String,
-    /// What was measured, or why nothing was.
-    pub outcome: Result<Probed, TrialFailure>,
-}
-
-/// What was measured of a candidate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Probed {
-    /// What a frame with it would take: its build as measured (that of the incumbent if it is the same), and
-    /// rendering as its tiles say.
-    pub times: FrameTimes,
-    /// Time to render over that of the incumbent, in this frame.
-    pub ratio: ProbeRatio,
-    /// The cost by the metric over that of the incumbent, all probes of it together, and its bounds.
-    pub cost_ratio: [f64; 3],
-    /// The cost by the metric that the search was told, in seconds.
-    pub cost: f64,
-    /// The share of the tiles that were traced through the candidate.
-    pub share: f64,
-    /// What was decided.
-    pub decision: Decision,
-}
 
 /// The tree that frames are rendered with.
 #[derive(Debug)]
@@ -465,87 +414,6 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     fn tell(&mut self, trial: &Trial, outcome: Outcome) -> Result<(), SessionError> {
         let told = self.tuner.tell(trial.id, outcome);
         told.map(|_| ()).map_err(SessionError::Tell)
-    }
-
-    /// Looks whether frames take what they took: `times` of tiles with the incumbent.
-    fn watch(&mut self, times: &[(usize, f64)]) {
-        let (mut took, mut expected) = (0.0, 0.0);
-        for &(tile, time) in times {
-            took += time;
-            expected += self.tiles[tile];
-            let most = INTERRUPTED * self.tiles[tile];
-            self.tiles[tile] += FRESH * (time.min(most) - self.tiles[tile]);
-        }
-        if self.detector.add((took / expected).ln()) && !self.is_searching {
-            self.check = self.yardstick();
-        }
-    }
-
-    /// The best of what is not the incumbent.
-    fn yardstick(&self) -> Option<(Config, f64)> {
-        let incumbent = self.incumbent.as_ref()?;
-        let records = self.tuner.records().iter();
-        let others = records
-            .filter(|record| record.canonical != incumbent.config && record.cost.is_finite());
-        let best = others.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-        let log = (best.cost / self.unit).ln() - incumbent.log_cost;
-        Some((best.config.clone(), log))
-    }
-
-    /// After a probe of what is known: the search begins again if its cost over that of the incumbent is not
-    /// what it was.
-    fn checked(&mut self, incumbent: &Incumbent, probed: &Probed, known: f64) {
-        let now = (probed.cost / self.unit).ln() - incumbent.log_cost;
-        if (now - known).abs() > SAME.max(2.0 * probed.ratio.deviation) {
-            self.begin_again(incumbent);
-        }
-    }
-
-    /// Searches once more, beginning with what was best.
-    fn begin_again(&mut self, incumbent: &Incumbent) {
-        let mut records: Vec<_> = self.tuner.records().to_vec();
-        records.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let best = records.into_iter().filter(|record| !record.has_failed());
-        let mut starts: Vec<Config> = best.take(KEPT).map(|record| record.config).collect();
-        let portfolio = self.starts.iter();
-        starts.extend(portfolio.filter_map(|params| self.space.config(params).ok()));
-        self.begun += 1;
-        let seed = self.stage.settings.seed.wrapping_add(self.begun);
-        self.tuner = Tuner::new(self.space.space().clone(), (self.search.0)(), seed);
-        let cost = self.unit * incumbent.log_cost.exp();
-        let config = self.space.config(&incumbent.params);
-        if let Ok(config) = config {
-            // A cost that was told before can be told again.
-            let _ = self.tuner.tell_known(&config, Outcome::Done { cost });
-        }
-        for config in starts {
-            self.tuner.add_new_start(config);
-        }
-        self.probed.clear();
-        (self.quiet, self.fruitless) = (0, 0);
-        self.is_searching = true;
-    }
-
-    /// Renders another scene, or from another camera, from the next frame on; both to be those that
-    /// differ from before in what concerns trees. The incumbent's parameters stay, its tree is built anew, and
-    /// the search begins again.
-    ///
-    /// # Errors
-    /// If the camera cannot be used, or the incumbent's parameters do not suit the scene.
-    pub fn change_scene(&mut self, world: &'a World, camera: Camera) -> Result<(), SessionError> {
-        camera.validate().map_err(SessionError::Camera)?;
-        self.stage.show(world, camera);
-        if let Some(mut incumbent) = self.incumbent.take() {
-            let built = self.stage.build(&incumbent.params);
-            let (tree, time) = built.map_err(SessionError::Build)?;
-            self.stage
-                .recycle(std::mem::replace(&mut incumbent.tree, tree));
-            incumbent.builds = vec![time.as_secs_f64()];
-            self.begin_again(&incumbent);
-            self.detector = ChangeDetector::new(LEAST_NOISE);
-            self.incumbent = Some(incumbent);
-        }
-        Ok(())
     }
 
     /// Renders from another place of the same scene from the next frame on. The picture begins anew. Whether

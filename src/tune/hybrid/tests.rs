@@ -11,7 +11,7 @@ use raywright_tracer::{Integrator, Shot, generate};
 use raywright_tuner::GaussianProcess;
 
 use super::*;
-use crate::tune::{Metric, SpaceAxes, TrialFailure, WallClock, portfolio};
+use crate::tune::{Decision, Metric, SpaceAxes, TrialFailure, WallClock, portfolio};
 
 /// Goes on by another step each time that it is looked at; with 0 it stands still.
 struct OddClock(AtomicU64, u64);

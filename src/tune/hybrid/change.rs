@@ -1,0 +1,105 @@
+//! Whether what was found still holds, and what is done if not.
+//!
+//! The frames of the incumbent are watched; on an alarm the second best is tried once. If its cost over that of
+//! the incumbent is what it was, the machine has changed and nothing else; if not, the search begins again.
+//!
+//! Invariant: what was told is not forgotten without being asked again: the best are starts of the next search.
+
+use raywright_imaging::Camera;
+use raywright_tracer::World;
+use raywright_tuner::{ChangeDetector, Config, Outcome, Tuner};
+
+use super::{FRESH, Hybrid, Incumbent, LEAST_NOISE, Probed};
+use crate::tune::{
+    probe::INTERRUPTED,
+    stage::{Clock, SessionError},
+};
+
+/// A change of the ratio of two trees below this is none, as a logarithm.
+const SAME: f64 = 0.05;
+
+/// Outcomes that are told again when the search begins again: the best.
+const KEPT: usize = 3;
+
+impl<'a, C: Clock> Hybrid<'a, C> {
+    /// Looks whether frames take what they took: `times` of tiles with the incumbent.
+    pub(super) fn watch(&mut self, times: &[(usize, f64)]) {
+        let (mut took, mut expected) = (0.0, 0.0);
+        for &(tile, time) in times {
+            took += time;
+            expected += self.tiles[tile];
+            let most = INTERRUPTED * self.tiles[tile];
+            self.tiles[tile] += FRESH * (time.min(most) - self.tiles[tile]);
+        }
+        if self.detector.add((took / expected).ln()) && !self.is_searching {
+            self.check = self.yardstick();
+        }
+    }
+
+    /// The best of what is not the incumbent.
+    fn yardstick(&self) -> Option<(Config, f64)> {
+        let incumbent = self.incumbent.as_ref()?;
+        let records = self.tuner.records().iter();
+        let others = records
+            .filter(|record| record.canonical != incumbent.config && record.cost.is_finite());
+        let best = others.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        let log = (best.cost / self.unit).ln() - incumbent.log_cost;
+        Some((best.config.clone(), log))
+    }
+
+    /// After a probe of what is known: the search begins again if its cost over that of the incumbent is not
+    /// what it was.
+    pub(super) fn checked(&mut self, incumbent: &Incumbent, probed: &Probed, known: f64) {
+        let now = (probed.cost / self.unit).ln() - incumbent.log_cost;
+        if (now - known).abs() > SAME.max(2.0 * probed.ratio.deviation) {
+            self.begin_again(incumbent);
+        }
+    }
+
+    /// Searches once more, beginning with what was best.
+    pub(super) fn begin_again(&mut self, incumbent: &Incumbent) {
+        let mut records: Vec<_> = self.tuner.records().to_vec();
+        records.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let best = records.into_iter().filter(|record| !record.has_failed());
+        let mut starts: Vec<Config> = best.take(KEPT).map(|record| record.config).collect();
+        let portfolio = self.starts.iter();
+        starts.extend(portfolio.filter_map(|params| self.space.config(params).ok()));
+        self.begun += 1;
+        let seed = self.stage.settings.seed.wrapping_add(self.begun);
+        self.tuner = Tuner::new(self.space.space().clone(), (self.search.0)(), seed);
+        let cost = self.unit * incumbent.log_cost.exp();
+        let config = self.space.config(&incumbent.params);
+        if let Ok(config) = config {
+            // A cost that was told before can be told again.
+            let _ = self.tuner.tell_known(&config, Outcome::Done { cost });
+        }
+        for config in starts {
+            self.tuner.add_new_start(config);
+        }
+        self.probed.clear();
+        (self.quiet, self.fruitless) = (0, 0);
+        self.is_searching = true;
+    }
+
+    /// Renders another scene, or from another camera, from the next frame on; both to be those that
+    /// differ from before in what concerns trees. The incumbent's parameters stay, its tree is built anew, and
+    /// the search begins again.
+    ///
+    /// # Errors
+    /// If the camera cannot be used, or the incumbent's parameters do not suit the scene.
+    pub fn change_scene(&mut self, world: &'a World, camera: Camera) -> Result<(), SessionError> {
+        camera.validate().map_err(SessionError::Camera)?;
+        self.stage.show(world, camera);
+        if let Some(mut incumbent) = self.incumbent.take() {
+            let built = self.stage.build(&incumbent.params);
+            let (tree, time) = built.map_err(SessionError::Build)?;
+            self.stage
+                .recycle(std::mem::replace(&mut incumbent.tree, tree));
+            incumbent.builds = vec![time.as_secs_f64()];
+            self.begin_again(&incumbent);
+            self.detector = ChangeDetector::new(LEAST_NOISE);
+            self.incumbent = Some(incumbent);
+        }
+        Ok(())
+    }
+}
