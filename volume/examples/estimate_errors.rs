@@ -13,7 +13,7 @@ use std::{error::Error, path::Path};
 use raywright_bvh::BuildWorkspace;
 use raywright_volume::{
     CastOptions, Counts, EnclosureKind, EnclosureParams, EstimateMethod, Estimator, LoadOptions,
-    Raycaster, Skipping, View, estimate::TILE_SIZE, load_volume,
+    Raycaster, Skipping, View, load_volume,
 };
 
 const SIZE: [u32; 2] = [512; 2];
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                     for (tile, ray) in (0..).zip(&estimate.rays) {
                         // The pixel in the middle of the square.
                         let [x, y] = [tile % estimate.tiles[0], tile / estimate.tiles[0]]
-                            .map(|i| i * TILE_SIZE + TILE_SIZE / 2);
+                            .map(|i| i * estimate.tile_size + estimate.tile_size / 2);
                         let work = picture.ray_work[(y * SIZE[0] + x) as usize];
                         let samples = f64::from(work.samples);
                         found += samples;

@@ -52,13 +52,13 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_delimiter = ',', default_value = "101,102,103")]
     seeds: Vec<u64>,
     /// Moments of the sequence per second
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 30.0)]
     fps: f64,
     /// Seconds that a frame may take; by default so many that three of four frames with a step of 0.75 are faster
     #[arg(long, value_name = "SECONDS")]
     target: Option<f64>,
     /// Side of pictures in pixels
-    #[arg(long, default_value_t = 256)]
+    #[arg(long, default_value_t = 96)]
     side: u32,
     /// Let our ways leave out rays where steps of two voxels are not enough
     #[arg(long)]
@@ -321,7 +321,7 @@ fn page(
     timeline_page(&header, &timelines)
 }
 
-const CSV_HEAD: &str = "volume,caster,sequence,way,time_s,target_s,frame_s,cast_s,preparing_s,overhead_s,predicted_s,step,step_spread,samples,estimated_samples,cost_ratio,is_switch\n";
+const CSV_HEAD: &str = "volume,caster,sequence,way,time_s,target_s,frame_s,cast_s,preparing_s,overhead_s,predicted_s,step,step_spread,samples,estimated_samples,cost_ratio,is_switch,is_within\n";
 
 /// Every frame of every run.
 fn csv(volume: &OfVolume) -> String {
@@ -330,7 +330,7 @@ fn csv(volume: &OfVolume) -> String {
         for f in &run.frames {
             let _ = writeln!(
                 text,
-                "{},{},{sequence},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{sequence},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 volume.name,
                 caster.name(),
                 run.way.name().replace(',', ""),
@@ -347,6 +347,7 @@ fn csv(volume: &OfVolume) -> String {
                 f.estimated,
                 f.cost_ratio,
                 f.is_switch,
+                f.is_within,
             );
         }
     }

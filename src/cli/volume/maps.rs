@@ -6,7 +6,7 @@ use raywright::{
     imaging::{AnyCamera, Camera, Image},
     volume::{
         CastOptions, Counts, EstimateMethod, Estimator, Picture, Raycaster, TransferFunction,
-        Volume, estimate::TILE_SIZE,
+        Volume,
     },
 };
 
@@ -152,7 +152,7 @@ impl<'a> Maps<'a> {
         let brightness = |end: f32| ((far - end) / (far - near)).clamp(0.0, 1.0);
         for (pixel, colour) in pixels {
             let [x, y] = [pixel as u32 % size[0], pixel as u32 / size[0]];
-            let tile = y / TILE_SIZE * estimate.tiles[0] + x / TILE_SIZE;
+            let tile = y / estimate.tile_size * estimate.tiles[0] + x / estimate.tile_size;
             let ray = &estimate.rays[tile as usize];
             let is_expected = ray.front < ray.back;
             let expected = if is_expected {

@@ -11,8 +11,10 @@ mod way;
 
 use crate::imaging::Image;
 use crate::volume::{
-    Drawn, Estimator, FrameLoop, Raycaster, Refined, Sequence, Volume, frames::FrameError,
-    sequence::SequenceError, steer::Resolution,
+    Drawn, Estimator, FrameLoop, Raycaster, Refined, Sequence, Volume,
+    frames::FrameError,
+    sequence::{Moment, SequenceError},
+    steer::Resolution,
 };
 use clock::Timer;
 pub use clock::{CLOCK_COSTS, Clock};
@@ -48,12 +50,14 @@ pub struct FrameRow {
     pub cost_ratio: f64,
     /// Whether another transfer function holds from this frame on.
     pub is_switch: bool,
+    /// Whether the camera is within the box of the volume.
+    pub is_within: bool,
     /// How it differs from a frame with one step, where that was looked at and steps differ.
     pub seam: Option<Seam>,
 }
 
 impl FrameRow {
-    fn new(drawn: &Drawn, time: f64, is_switch: bool) -> Self {
+    fn new(drawn: &Drawn, moment: &Moment, volume: &Volume, is_switch: bool) -> Self {
         let predicted = drawn.prediction;
         let samples = drawn.picture.work.samples as f64;
         // Of the same samples, whatever the unit of the prediction is.
@@ -68,8 +72,9 @@ impl FrameRow {
             .fold([f64::INFINITY, 0.0_f64], |[low, high], &s| {
                 [low.min(s), high.max(s)]
             });
+        let place = moment.camera.origin;
         Self {
-            time,
+            time: moment.time,
             step: drawn.quality.step,
             step_spread: spread[1] / spread[0],
             frame_time: drawn.frame_time,
@@ -81,6 +86,7 @@ impl FrameRow {
             estimated: drawn.estimated_samples,
             cost_ratio: predicted.time / drawn.cast_time * samples_ratio,
             is_switch,
+            is_within: place.min_element() >= 0.0 && place.cmple(volume.extent()).all(),
             seam: None,
         }
     }
@@ -191,7 +197,7 @@ pub fn run(
         last_key = Some(moment.function_key);
         for (frames, timer, run) in &mut loops {
             let drawn = frames.draw(&moment, timer)?;
-            let mut row = FrameRow::new(&drawn, moment.time, is_switch);
+            let mut row = FrameRow::new(&drawn, &moment, stage.volume, is_switch);
             if stage.seams && run.way == Way::Parts {
                 row.seam = Seam::of(stage, &moment, &drawn)?;
             }
@@ -237,7 +243,7 @@ pub fn play(
             .as_ref()
             .is_some_and(|(last, _)| last.function_key != moment.function_key);
         let drawn = frames.draw(&moment, &mut timer)?;
-        let row = FrameRow::new(&drawn, time, is_switch);
+        let row = FrameRow::new(&drawn, &moment, stage.volume, is_switch);
         run.frames.push(row);
         if !tell(&row, &drawn.picture.image) {
             break;

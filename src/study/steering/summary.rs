@@ -20,6 +20,8 @@ pub struct Summary {
     pub rmse: f64,
     /// The slowest frame: its time less the target; negative if no frame was slower.
     pub error_up: f64,
+    /// The slowest frame with the camera outside of the volume, likewise.
+    pub error_up_outside: f64,
     /// The fastest frame, likewise.
     pub error_low: f64,
     /// Share of frames above the target.
@@ -50,6 +52,7 @@ impl Summary {
     #[must_use]
     pub fn of<'r>(runs: impl Iterator<Item = &'r Run>) -> Self {
         let mut loads = Vec::new();
+        let mut outside = f64::NEG_INFINITY;
         let (mut steps, mut logs) = (0.0, 0.0);
         let (mut slow_run, mut overheads) = (0, Vec::new());
         let mut ratios: [Vec<f64>; 3] = Default::default();
@@ -59,6 +62,9 @@ impl Summary {
             for (index, frame) in run.frames.iter().enumerate() {
                 let load = frame.frame_time / run.target;
                 loads.push(load);
+                if !frame.is_within {
+                    outside = outside.max(load - 1.0);
+                }
                 steps += frame.step;
                 logs += frame.step.ln();
                 slow = if load > 1.0 { slow + 1 } else { 0 };
@@ -109,6 +115,7 @@ impl Summary {
             rmse_low: root_mean_square(&low),
             rmse: root_mean_square(&all),
             error_up: at(&loads, 1.0) - 1.0,
+            error_up_outside: outside,
             error_low: at(&loads, 0.0) - 1.0,
             slow: share(1.0),
             above_tenth: share(1.1),
@@ -149,6 +156,7 @@ mod tests {
             estimated: 5.0,
             cost_ratio: predicted / frame_time,
             is_switch: false,
+            is_within: frame_time > 2.9,
             seam: None,
         }
     }
@@ -169,6 +177,7 @@ mod tests {
         assert!((found.rmse_up - ((0.25 + 0.0025) / 2.0_f64).sqrt()).abs() < 1e-12);
         assert!((found.rmse_low - (0.25 / 11.0_f64).sqrt()).abs() < 1e-12);
         assert!((found.error_up - 0.5).abs() < 1e-12 && (found.error_low + 0.5).abs() < 1e-12);
+        assert!((found.error_up_outside - 0.05).abs() < 1e-12);
         assert!((found.slow - 2.0 / 13.0).abs() < 1e-12);
         assert!((found.above_tenth - 1.0 / 13.0).abs() < 1e-12);
         assert!((found.prediction - (0.01 / 3.0_f64).sqrt()).abs() < 1e-12);

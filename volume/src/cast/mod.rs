@@ -17,6 +17,8 @@ mod sparse;
 mod tiles;
 pub(crate) mod view;
 
+use std::sync::Arc;
+
 use raywright_bvh::{BuildWorkspace, TreeStats};
 use raywright_imaging::{AnyCamera, Image, PictureFrame};
 
@@ -162,7 +164,7 @@ impl<'a> Raycaster<'a> {
         let baked = baked.with(&entries, reach);
         Prepared {
             caster: self,
-            distances: DistanceMap::new(&self.blocks, &baked),
+            distances: Arc::new(DistanceMap::new(&self.blocks, &baked)),
             baked,
             surfaces,
             appearance,
@@ -220,11 +222,16 @@ pub struct Prepared<'a> {
     baked: BakedFunction,
     /// By rising value.
     surfaces: Vec<RawSurface>,
-    distances: DistanceMap,
+    distances: Arc<DistanceMap>,
     enclosure: Option<Enclosure>,
 }
 
 impl Prepared<'_> {
+    /// How far from what can be seen each block is.
+    pub(crate) fn distances(&self) -> &Arc<DistanceMap> {
+        &self.distances
+    }
+
     /// Builds a tree around what can be seen, for [`Skipping::Enclosure`]; the tree that there was goes,
     /// and gives its memory to the workspace. Returns what the tree is like.
     ///

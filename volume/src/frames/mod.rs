@@ -16,7 +16,7 @@ use rest::Rest;
 
 use crate::{
     appearance::{Appearance, AppearanceError},
-    cast::{CastError, CastOptions, Picture, Prepared, Raycaster, parts},
+    cast::{CastError, CastOptions, Picture, Prepared, Raycaster, Skipping, parts},
     enclosure::{EnclosureError, EnclosureParams},
     estimate::{EstimateMethod, Estimator, PreparedEstimate},
     grid::Volume,
@@ -225,10 +225,12 @@ impl<'a> FrameLoop<'a> {
                 let prepared =
                     prepare(self.caster, &self.params, &mut self.workspace, &appearance)?;
                 preparing = clock.overhead();
-                // It knows nothing of surfaces: what they change is learned.
-                let estimate = self
+                let mut estimate = self
                     .estimator
                     .prepare(&appearance.function, self.params.method);
+                if options.skipping == Skipping::Distance {
+                    estimate = estimate.with_blocks_of(&prepared);
+                }
                 Shown {
                     appearance,
                     prepared,

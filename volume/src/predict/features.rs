@@ -157,6 +157,7 @@ mod tests {
             longest: 1000.0,
             lit_length: 300.0,
             seen_length: 150.0,
+            jumps: 300.0,
             coarse_steps: 7.0,
         }
     }

@@ -9,10 +9,7 @@
 use raywright_imaging::Camera;
 
 use super::{PredictError, Quality};
-use crate::{
-    estimate::{Estimate, TILE_SIZE},
-    grid::Volume,
-};
+use crate::{estimate::Estimate, grid::Volume};
 
 /// What is known of a frame before it is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +32,8 @@ pub struct Outlook {
     pub lit_length: f64,
     /// The part of `length` at which something is seen.
     pub seen_length: f64,
+    /// Jumps of all rays over empty space, a ray for every pixel.
+    pub jumps: f64,
     /// Blocks that the estimate looked at, for each of its rays that met the box.
     pub coarse_steps: f64,
 }
@@ -52,17 +51,19 @@ impl Outlook {
     ) -> Self {
         let step = f64::from(step);
         let covered = |tile: u32, size: u32| {
-            let first = tile * TILE_SIZE;
-            f64::from((first + TILE_SIZE).min(size).saturating_sub(first))
+            let first = tile * estimate.tile_size;
+            f64::from((first + estimate.tile_size).min(size).saturating_sub(first))
         };
         let (mut length, mut longest) = (0.0, 0.0);
-        let (mut lit_length, mut seen_length) = (0.0, 0.0);
+        let (mut lit_length, mut seen_length, mut jumps) = (0.0, 0.0, 0.0);
         for (index, ray) in estimate.rays.iter().enumerate() {
             let (x, y) = (
                 index as u32 % estimate.tiles[0],
                 index as u32 / estimate.tiles[0],
             );
-            let weight = covered(x, width) * covered(y, height) * step;
+            let pixels = covered(x, width) * covered(y, height);
+            jumps += pixels * f64::from(ray.jumps);
+            let weight = pixels * step;
             length += weight * f64::from(ray.end - ray.front);
             longest += weight * f64::from(ray.back - ray.front);
             lit_length += weight * f64::from(ray.lit);
@@ -88,6 +89,7 @@ impl Outlook {
             longest,
             lit_length,
             seen_length,
+            jumps,
             coarse_steps: estimate.steps as f64 / coarse_rays.max(1.0),
         }
     }
@@ -147,6 +149,7 @@ impl Outlook {
             ("longest", self.longest, 0.0),
             ("lit_length", self.lit_length, 0.0),
             ("seen_length", self.seen_length, 0.0),
+            ("jumps", self.jumps, 0.0),
             ("coarse_steps", self.coarse_steps, 0.0),
         ] {
             if !(value >= least && value.is_finite()) {

@@ -17,6 +17,7 @@ use super::{
     Prediction, PredictorParams, Quality, SampleUnit,
 };
 use crate::cast::Work;
+use learning::Told;
 
 /// Residuals from which the noise of times is found.
 const RESIDUALS: usize = 32;
@@ -35,6 +36,10 @@ const SAFE_QUANTILE: f64 = 0.95;
 const MAX_BIAS: f64 = 3.0;
 const MAX_SPEED: f64 = 2.0;
 
+/// Indices of the kernel models.
+const COST: usize = 0;
+const BIAS: usize = 1;
+
 /// Units of costs for the kernel model, seconds: numbers near 1.
 const COST_UNIT: f64 = 1e-9;
 
@@ -48,8 +53,10 @@ pub struct FramePredictor {
     additive: AdditiveModel,
     /// log g.
     log_speed: f64,
-    /// Logarithms of counted over expected rays, skips, lit samples.
-    log_ratios: [f64; 3],
+    /// Counted and expected rays, skips, lit samples: sums over recent frames.
+    recent: [[f64; 2]; 3],
+    /// What the kernel models of cost and bias were told in recent frames.
+    told: [Told; 2],
     residuals: VecDeque<f64>,
     costs: VecDeque<f64>,
     frames: u64,
@@ -77,7 +84,8 @@ impl FramePredictor {
             bias: params.bias.map(Krls::new).transpose()?,
             additive: AdditiveModel::new(params.cold_start, params.additive_memory),
             log_speed: 0.0,
-            log_ratios: [0.0; 3],
+            recent: [[0.0; 2]; 3],
+            told: Default::default(),
             residuals: VecDeque::with_capacity(RESIDUALS),
             costs: VecDeque::with_capacity(COSTS),
             frames: 0,
@@ -98,7 +106,8 @@ impl FramePredictor {
         self.volume_version = volume_version;
         self.additive = AdditiveModel::new(self.params.cold_start, self.params.additive_memory);
         self.log_speed = 0.0;
-        self.log_ratios = [0.0; 3];
+        self.recent = [[0.0; 2]; 3];
+        self.told = Default::default();
         self.residuals.clear();
         self.costs.clear();
         self.frames = 0;
@@ -213,7 +222,7 @@ impl FramePredictor {
             && samples > 0.0
         {
             let known = model.predict_with_deviation(&features)?;
-            let cost = known.mean * COST_UNIT;
+            let cost = self.told[COST].bound(known.mean) * COST_UNIT;
             // Nothing learned is 0, and what is far from all that was learned may be negative.
             if cost > 0.0 {
                 novelty = known.novelty;
@@ -252,11 +261,14 @@ impl FramePredictor {
         features: &[f64; FEATURES],
     ) -> Result<Counts, PredictError> {
         let bias = match &self.bias {
-            Some(bias) => bias.predict(features)?.clamp(-MAX_BIAS, MAX_BIAS),
+            Some(bias) => self.told[BIAS].bound(bias.predict(features)?),
             None => 0.0,
         };
         let expected = estimated(outlook, quality);
-        let [rays, skips, lit] = self.log_ratios.map(f64::exp);
+        let [rays, skips, lit] = self.recent.map(|[counted, expected]| {
+            // One of each more: a ratio of nothing is 1.
+            (counted + 1.0) / (expected + 1.0)
+        });
         Ok(Counts {
             rays: expected.rays * rays,
             skips: expected.skips * skips,
@@ -288,7 +300,7 @@ fn estimated(outlook: &Outlook, quality: Quality) -> Counts {
     let samples = outlook.lit_length / quality.coarseness();
     Counts {
         rays,
-        skips: rays * outlook.coarse_steps,
+        skips: outlook.jumps / quality.pixels_per_ray.count(),
         samples,
         lit: outlook.seen_length / quality.coarseness(),
     }

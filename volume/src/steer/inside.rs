@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use super::search::StepLimits;
-use crate::estimate::{Estimate, TILE_SIZE};
+use crate::estimate::Estimate;
 
 /// The share of the target that is aimed at, so that the last part may err too.
 const AIM: f64 = 0.99;
@@ -49,7 +49,7 @@ pub fn part_shares(estimate: &Estimate, height: u32, parts: &[Vec<Range<u32>>]) 
         .map(|row| row.iter().map(|ray| f64::from(ray.samples())).sum())
         .collect();
     let length_of = |rows: &Range<u32>| -> f64 {
-        let squares = rows.start / TILE_SIZE..rows.end.div_ceil(TILE_SIZE);
+        let squares = rows.start / estimate.tile_size..rows.end.div_ceil(estimate.tile_size);
         squares.filter_map(|row| lengths.get(row as usize)).sum()
     };
     let all: f64 = parts.iter().flatten().map(length_of).sum();
@@ -268,6 +268,7 @@ impl Inside {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::TILE_SIZE;
 
     const LIMITS: StepLimits = StepLimits {
         shortest: 0.25,
@@ -383,6 +384,7 @@ mod tests {
             ..Default::default()
         };
         let estimate = Estimate {
+            tile_size: TILE_SIZE,
             tiles: [2, 9],
             rays: (0..18).map(|i| ray(2.0 + i as f32)).collect(),
             in_box: 18,

@@ -10,6 +10,7 @@ fn outlook(angle: f64, lit_share: f64) -> Outlook {
         longest: 1e7,
         lit_length: 8e6 * lit_share,
         seen_length: 3e6 * lit_share,
+        jumps: 1.2e6,
         coarse_steps: 12.0,
     }
 }
@@ -249,4 +250,24 @@ fn what_is_refused() {
         let error = FramePredictor::new(params).unwrap_err();
         assert!(matches!(error, PredictError::Parameter { .. }), "{error}");
     }
+}
+
+#[test]
+fn no_trend_is_followed_beyond_what_was_told() {
+    // Each frame takes half as many samples of what is estimated: the bias falls, and stays where it was last.
+    let mut predictor = FramePredictor::new(PredictorParams::plus()).unwrap();
+    let quality = Quality::with_step(1.0);
+    let mut told = f64::INFINITY;
+    for i in 0..6 {
+        let outlook = outlook(f64::from(i) * 0.05, 0.5);
+        let mut work = work(&outlook, quality);
+        work.samples >>= i;
+        let time = costs().time(&Counts::from(&work));
+        predictor.learn(&outlook, quality, &work, time).unwrap();
+        told = told.min(work.samples as f64);
+    }
+    let next = outlook(0.3, 0.5);
+    let counts = predictor.predict(&next, quality).unwrap().counts;
+    assert!(counts.samples >= 0.999 * told, "{} {told}", counts.samples);
+    assert!(counts.samples < 2.0 * told, "{} {told}", counts.samples);
 }
