@@ -199,7 +199,13 @@ fn configurations(args: &RecordArgs) -> Result<Vec<(&'static str, BuildParams)>,
         ("embree-scene", BuildParams::embree_scene_medium()),
     ];
     let default = BuildParams::default();
-    named.extend(portfolio(&default).into_iter().map(|p| ("portfolio", p)));
+    for metric in [Metric::Render, Metric::Total] {
+        for params in portfolio(&default, metric) {
+            if named.iter().all(|known| *known != ("portfolio", params)) {
+                named.push(("portfolio", params));
+            }
+        }
+    }
     named.truncate(args.configurations as usize);
     let space = ParameterSpace::new(&default, &[], SpaceAxes::Canonical)?;
     let known: Vec<BuildParams> = named.iter().map(|(_, params)| *params).collect();

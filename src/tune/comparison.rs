@@ -1,7 +1,7 @@
 //! Tuned parameters beside fixed baselines, measured in turns.
 //!
-//! Every round builds and renders each row once, beginning with another row each time, so that a
-//! drift of the machine falls on all alike. All rows render the same samples. A figure is a ratio
+//! Every round builds and renders each row once, beginning with another row each time, and every other round
+//! in reverse, so that a drift of the machine and what a row leaves in caches and memory fall on all alike. All rows render the same samples. A figure is a ratio
 //! within a round.
 
 use std::time::Duration;
@@ -61,6 +61,18 @@ pub struct Comparison {
     pub rows: Vec<Measurement>,
 }
 
+/// The rows of a round in their turns: in any two rounds each row follows those that it precedes.
+fn order(round: usize, rows: usize) -> impl Iterator<Item = usize> {
+    (0..rows).map(move |turn| {
+        let turn = if round.is_multiple_of(2) {
+            turn
+        } else {
+            rows - 1 - turn
+        };
+        (round / 2 + turn) % rows
+    })
+}
+
 impl<C: Clock> Stage<'_, C> {
     /// Measures `tuned` beside both baselines; see [`Session::compare`](super::Session::compare).
     pub(super) fn compare(
@@ -83,8 +95,7 @@ impl<C: Clock> Stage<'_, C> {
         for round in 0..=rounds {
             progress(round, rounds + 1);
             let mut times: Vec<Option<FrameTimes>> = vec![None; rows.len()];
-            for turn in 0..rows.len() {
-                let row = (round + turn) % rows.len();
+            for row in order(round, rows.len()) {
                 let (tree, build) = self.build(&rows[row].params).map_err(SessionError::Build)?;
                 let rendered = self.render(&tree, round as u32, Duration::MAX, cancel)?;
                 self.recycle(tree);
@@ -118,4 +129,24 @@ impl Measurement {
 #[must_use]
 pub fn milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_is_behind_and_before_every_other_alike() {
+        let mut pairs = [[0; 3]; 3];
+        for round in 0..6 {
+            let order: Vec<usize> = order(round, 3).collect();
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2]);
+            for pair in order.windows(2) {
+                pairs[pair[0]][pair[1]] += 1;
+            }
+        }
+        assert_eq!(pairs, [[0, 2, 2], [2, 0, 2], [2, 2, 0]]);
+    }
 }

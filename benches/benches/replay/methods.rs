@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use raywright_benches::recordings::{PORTFOLIO, SpaceKind};
+use raywright_benches::recordings::SpaceKind;
 use raywright_tuner::{Search, Space, search_by_name};
 
 /// A search with everything that belongs to it.
@@ -11,10 +11,25 @@ pub(crate) struct Method {
     pub(crate) name: &'static str,
     pub(crate) space: SpaceKind,
     search: Kind,
-    /// Names of rows that are tried first.
-    pub(crate) starts: &'static [&'static str],
+    pub(crate) starts: Starts,
+    /// Frames in vain after which what is best so far is kept.
+    pub(crate) patience: Option<u32>,
     pub(crate) seeds: u64,
 }
+
+/// What is tried first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Starts {
+    Nothing,
+    /// The strong default.
+    #[cfg(feature = "peers")]
+    Strong,
+    /// So many configurations that together are good in the other scenes.
+    OfOtherScenes(usize),
+}
+
+/// Those of most searches that have some.
+pub(crate) const THREE: Starts = Starts::OfOtherScenes(3);
 
 /// Whose search it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,36 +42,34 @@ enum Kind {
 const SEEDS: u64 = 10;
 
 /// The search that is judged beside the peers.
-pub(crate) const JUDGED: &str = "3 starts + Gaussian process, canonical";
+pub(crate) const JUDGED: &str = "the same, ends after 12 frames in vain";
 
 impl Method {
     const fn own(
         name: &'static str,
         space: SpaceKind,
         search: &'static str,
-        starts: &'static [&'static str],
+        starts: Starts,
     ) -> Method {
         Method {
             name,
             space,
             search: Kind::Own(search),
             starts,
+            patience: None,
             seeds: SEEDS,
         }
     }
 
     /// A search that is not ours, in the canonical space.
     #[cfg(feature = "peers")]
-    pub(crate) const fn peer(
-        name: &'static str,
-        search: &'static str,
-        starts: &'static [&'static str],
-    ) -> Method {
+    pub(crate) const fn peer(name: &'static str, search: &'static str, starts: Starts) -> Method {
         Method {
             name,
             space: SpaceKind::Canonical,
             search: Kind::Peer(search),
             starts,
+            patience: None,
             seeds: SEEDS,
         }
     }
@@ -78,33 +91,50 @@ impl Method {
     }
 }
 
-const OWN: [Method; 6] = [
-    Method::own("random, printed", SpaceKind::Printed, "random", &[]),
+/// As that of `raywright::tune::Hybrid`.
+const PATIENCE: u32 = 12;
+
+const OWN: [Method; 7] = [
+    Method::own(
+        "random, printed",
+        SpaceKind::Printed,
+        "random",
+        Starts::Nothing,
+    ),
     Method::own(
         "paper: hypercube + simplex, printed",
         SpaceKind::Printed,
         "nelder-mead",
-        &[],
+        Starts::Nothing,
     ),
     Method::own(
         "hypercube + simplex, canonical",
         SpaceKind::Canonical,
         "nelder-mead",
-        &[],
+        Starts::Nothing,
     ),
     Method::own(
         "3 starts + simplex, canonical",
         SpaceKind::Canonical,
         "nelder-mead",
-        PORTFOLIO,
+        THREE,
     ),
     Method::own(
         "Gaussian process, canonical",
         SpaceKind::Canonical,
         "gaussian-process",
-        &[],
+        Starts::Nothing,
     ),
-    Method::own(JUDGED, SpaceKind::Canonical, "gaussian-process", PORTFOLIO),
+    Method::own(
+        "3 starts + Gaussian process, canonical",
+        SpaceKind::Canonical,
+        "gaussian-process",
+        THREE,
+    ),
+    Method {
+        patience: Some(PATIENCE),
+        ..Method::own(JUDGED, SpaceKind::Canonical, "gaussian-process", THREE)
+    },
 ];
 
 /// All searches that can be had.

@@ -3,20 +3,49 @@
 use std::error::Error;
 
 use raywright_benches::recordings::{DataSet, Metric, Problem, WEAK};
-use raywright_tuner::{Outcome, Tuner, replay::Pool};
+use raywright_tuner::{Config, Outcome, Tuner, replay::Pool};
 
-use crate::methods::{Method, Searches};
+use crate::methods::{Method, Searches, Starts};
 
 /// Frames after which figures are told.
 pub(crate) const TOLD: [usize; 4] = [10, 20, 40, 80];
 /// Frames of a search.
 const FRAMES: usize = TOLD[TOLD.len() - 1];
 
+/// Share of a frame that a probe gets.
+const PROBE: f64 = 1.0 / 8.0;
+
+/// A gain that is worth another [`Method::patience`] of frames.
+const LEAST_GAIN: f64 = 0.005;
+
 /// What a method did on a problem, mean over seeds of logarithms: after each of [`TOLD`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Score {
     pub(crate) regret: [f64; TOLD.len()],
     pub(crate) excess: [f64; TOLD.len()],
+    /// The excess if a configuration has but a part of a frame until it is known to be the best so far.
+    pub(crate) probed: [f64; TOLD.len()],
+}
+
+/// The configurations that a method tries first in a problem.
+fn starts(
+    method: &Method,
+    set: &DataSet,
+    problem: &Problem,
+    metric: Metric,
+) -> Result<Vec<Config>, Box<dyn Error>> {
+    Ok(match method.starts {
+        Starts::Nothing => Vec::new(),
+        #[cfg(feature = "peers")]
+        Starts::Strong => {
+            let strong = problem.row("strong8");
+            strong
+                .map(|row| row.config(method.space).clone())
+                .into_iter()
+                .collect()
+        }
+        Starts::OfOtherScenes(size) => set.cover(problem.scene(), metric, size, method.space)?,
+    })
 }
 
 pub(crate) fn score(
@@ -30,38 +59,68 @@ pub(crate) fn score(
     let rows = problem.rows.iter();
     let rows = rows.map(|row| (row.config(method.space).clone(), row.outcome(metric)));
     let rows: Vec<_> = rows.collect();
+    let starts = starts(method, set, problem, metric)?;
     let best = problem.best(metric);
-    let weak = problem.named(WEAK, metric);
-    let worst = weak.ok_or_else(|| format!("{}: no weak default", problem.name))?;
+    let weak = problem.row(WEAK);
+    let weak = weak.ok_or_else(|| format!("{}: no weak default", problem.name))?;
+    let worst = problem.named(WEAK, metric).unwrap_or(f64::INFINITY);
     let mut sum = Score::default();
     for seed in 0..method.seeds {
         let mut pool = Pool::new(space, rows.iter().cloned());
         let search = searches.search(method, space, FRAMES)?;
         let mut tuner = Tuner::new(space.clone(), search, seed);
-        for name in method.starts {
-            if let Some(row) = problem.row(name) {
-                tuner = tuner.with_start(row.config(method.space).clone());
-            }
+        for start in &starts {
+            tuner = tuner.with_start(start.clone());
         }
-        let (mut least, mut paid) = (f64::INFINITY, 0.0);
+        let (mut least, mut paid, mut paid_with_probes) = (f64::INFINITY, 0.0, 0.0);
+        // What is shown while others are probed.
+        let mut shown = weak;
+        let (mut in_vain, mut is_over) = (0, false);
         for frame in 1..=FRAMES {
-            let trial = tuner.ask();
-            // A table of fewer rows is known by then, and its best is what is shown from there on.
-            let outcome = pool
-                .answer(&mut tuner, &trial)?
-                .map_or(Outcome::Done { cost: least }, |answer| answer.0);
-            match outcome {
-                Outcome::Done { cost } => {
-                    least = least.min(cost);
-                    paid += cost;
+            if is_over {
+                paid += least;
+                paid_with_probes += least;
+            } else {
+                let trial = tuner.ask();
+                // A table of fewer rows is known by then, and its best is what is shown from there on.
+                let outcome = pool
+                    .answer(&mut tuner, &trial)?
+                    .map_or(Outcome::Done { cost: least }, |answer| answer.0);
+                let told = tuner.records().last().map(|record| &record.config);
+                let row = problem
+                    .rows
+                    .iter()
+                    .find(|row| Some(row.config(method.space)) == told);
+                in_vain += 1;
+                match (outcome, row) {
+                    (Outcome::Done { cost }, Some(row)) => {
+                        if cost < least * (1.0 - LEAST_GAIN) {
+                            in_vain = 0;
+                        }
+                        // The first frame is all there is to show.
+                        paid_with_probes += match least.is_finite() {
+                            true => row.probed(PROBE, shown, metric).unwrap_or(cost),
+                            false => cost,
+                        };
+                        if cost < least {
+                            (least, shown) = (cost, row);
+                        }
+                        paid += cost;
+                    }
+                    // A build that is refused costs a frame with what there is.
+                    _ => {
+                        paid += least.min(worst);
+                        paid_with_probes += least.min(worst);
+                    }
                 }
-                // A build that is refused costs a frame with what there is.
-                _ => paid += least.min(worst),
+                is_over = method.patience.is_some_and(|patience| in_vain >= patience);
             }
             if let Some(at) = TOLD.iter().position(|&told| told == frame) {
                 let seeds = method.seeds as f64;
+                let mean = |paid: f64| (paid / frame as f64 / best).ln() / seeds;
                 sum.regret[at] += (least / best).ln() / seeds;
-                sum.excess[at] += (paid / frame as f64 / best).ln() / seeds;
+                sum.excess[at] += mean(paid);
+                sum.probed[at] += mean(paid_with_probes);
             }
         }
         if let Some(failure) = searches.failure() {

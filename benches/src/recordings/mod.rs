@@ -11,12 +11,13 @@ mod spaces;
 mod state;
 
 use std::{
+    collections::{HashMap, HashSet},
     env,
     error::Error,
     path::{Path, PathBuf},
 };
 
-use raywright_tuner::{Config, Outcome, Space};
+use raywright_tuner::{Config, Outcome, Space, predict::greedy_members};
 
 pub use spaces::SpaceKind;
 pub use state::{State, features};
@@ -62,6 +63,8 @@ pub struct Row {
     configs: [Config; 2],
     /// By each metric; `None`: the build was refused.
     pub costs: Option<[f64; 2]>,
+    /// The part of the build in the cost of the second metric.
+    pub build: f64,
 }
 
 impl Row {
@@ -69,6 +72,19 @@ impl Row {
     #[must_use]
     pub fn config(&self, kind: SpaceKind) -> &Config {
         &self.configs[kind as usize]
+    }
+
+    /// What a frame costs that has a probe of this configuration in a share of it, and that of another in the
+    /// rest; builds are paid in full.
+    #[must_use]
+    pub fn probed(&self, share: f64, rest: &Row, metric: Metric) -> Option<f64> {
+        let (own, other) = (self.costs?[metric as usize], rest.costs?[metric as usize]);
+        let builds = match metric {
+            Metric::Render => [0.0; 2],
+            Metric::Total => [self.build, rest.build],
+        };
+        let casts = (own - builds[0]) * share + (other - builds[1]) * (1.0 - share);
+        Some(casts + builds[0] + builds[1])
     }
 
     /// What a tuner is told of it.
@@ -97,6 +113,12 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// The scene: the first word of the name.
+    #[must_use]
+    pub fn scene(&self) -> &str {
+        self.name.split(' ').next().unwrap_or_default()
+    }
+
     /// The row with a name.
     #[must_use]
     pub fn row(&self, name: &str) -> Option<&Row> {
@@ -130,6 +152,48 @@ pub struct DataSet {
 }
 
 impl DataSet {
+    /// The configurations that together are good in all scenes but one, by a metric, the most useful first, of those
+    /// that were recorded in all: what a tuner would begin with that knows the other scenes.
+    ///
+    /// # Errors
+    /// If a cost is none.
+    pub fn cover(
+        &self,
+        but: &str,
+        metric: Metric,
+        size: usize,
+        kind: SpaceKind,
+    ) -> Result<Vec<Config>, Box<dyn Error>> {
+        let space = self.space(kind);
+        let mut recorded_in: HashMap<&Config, usize> = HashMap::new();
+        for problem in &self.problems {
+            let configs: HashSet<&Config> = problem.rows.iter().map(|r| r.config(kind)).collect();
+            for config in configs {
+                *recorded_in.entry(config).or_default() += 1;
+            }
+        }
+        let (mut configs, mut states) = (Vec::new(), Vec::new());
+        for problem in self.problems.iter().filter(|p| p.scene() != but) {
+            let mut state = Vec::new();
+            for row in &problem.rows {
+                let Some(costs) = row.costs else { continue };
+                if recorded_in[row.config(kind)] < self.problems.len() {
+                    continue;
+                }
+                let point = space.encode(row.config(kind));
+                state.push((point.clone(), costs[metric as usize]));
+                configs.push((point, row.config(kind)));
+            }
+            states.push(state);
+        }
+        let members = greedy_members(&states, size)?;
+        let config = |member: Vec<f64>| {
+            let own = configs.iter().find(|(point, _)| *point == member);
+            own.map(|&(_, config)| config.clone())
+        };
+        Ok(members.into_iter().filter_map(config).collect())
+    }
+
     /// A space that all configurations have a place in.
     #[must_use]
     pub fn space(&self, kind: SpaceKind) -> &Space {

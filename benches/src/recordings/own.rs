@@ -16,12 +16,12 @@ use std::{
 
 use flate2::read::MultiGzDecoder;
 use raywright::tune::{ParameterSpace, SLOWEST_TRIAL, SpaceAxes};
-use raywright_bvh::{BuildParams, PARAMETERS};
+use raywright_bvh::{BuildParams, PARAMETERS, Quality};
 
 use super::{DataSet, FRAME_PIXELS, PORTFOLIO, Problem, Row, State, WEAK};
 use crate::scenes::{SceneCameras, cameras_file, scenes_folder};
 
-/// What the recorder calls the weak default, and known-good configurations in the order of its portfolio.
+/// What the recorder calls the weak default, and known-good configurations.
 const WEAK_SOURCE: &str = "table-1-default";
 const PORTFOLIO_SOURCE: &str = "portfolio";
 
@@ -175,19 +175,17 @@ fn scene_problems(
         return Err(format!("{scene} was recorded in two ways").into());
     }
     let frames = FRAME_PIXELS / pixels(run).ok_or_else(|| format!("{scene}: run {run}"))?;
-    // The first portfolio row is the strong default, and so on.
-    let mut portfolio: Vec<usize> = lines
-        .iter()
-        .filter(|line| line.source == PORTFOLIO_SOURCE)
-        .map(|line| line.row)
-        .collect();
-    portfolio.sort_unstable();
-    portfolio.dedup();
+    let strong = BuildParams::default();
+    let mut splits = strong;
+    splits.quality = Quality::SpatialSplits;
+    let mut morton = strong;
+    morton.quality = Quality::Morton;
     let name = |line: &Line| match line.source.as_str() {
         WEAK_SOURCE => WEAK,
         PORTFOLIO_SOURCE => {
-            let place = portfolio.iter().position(|&row| row == line.row);
-            place.map_or("", |place| PORTFOLIO.get(place).copied().unwrap_or(""))
+            let mut named = PORTFOLIO.iter().zip([strong, splits, morton]);
+            let own = named.find(|(_, params)| *params == line.params);
+            own.map_or("", |(name, _)| name)
         }
         _ => "",
     };
@@ -225,6 +223,7 @@ fn scene_problems(
                     spaces[1].config(&line.params)?,
                 ],
                 costs: costs.map(|costs| [costs[0] / weak[0], costs[1] / weak[1]]),
+                build: line.times.as_ref().map_or(0.0, |t| t.build) / (frame + build) / weak[1],
             })
         };
         let seconds = [frame * weak[0] / 1e3, (frame + build) * weak[1] / 1e3];

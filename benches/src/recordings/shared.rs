@@ -74,6 +74,12 @@ impl CameraRow {
         }
     }
 
+    /// The part of the build in the cost that counts it.
+    fn build(&self, row: &TableRow) -> f64 {
+        let whole = self.frames() * self.ref_ms_median + self.ref_build_ms_median;
+        row.build_ms.unwrap_or(0.0) / whole
+    }
+
     /// The costs of a row; `None` if its build was refused.
     fn costs(&self, row: &TableRow) -> Result<Option<[f64; 2]>, Box<dyn Error>> {
         if row.fail != 0 {
@@ -125,6 +131,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<DataSet>, Box<dyn Error>> {
                     SpaceKind::Canonical.config(&spaces[1], row)?,
                 ],
                 costs: camera.costs(row)?,
+                build: camera.build(row),
             });
         }
         let name = format!("{} {}", camera.scene, camera.cam);

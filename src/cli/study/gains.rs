@@ -173,7 +173,7 @@ fn one(
     let clock = WallClock::start();
     let hybrid = Hybrid::new(world, camera, settings, space, &strong, search, clock)?;
     let mut hybrid = hybrid
-        .with_starts(&portfolio(&strong))
+        .with_starts(&portfolio(&strong, metric))
         .with_overhead_limit(args.overhead);
     let (mut tried, mut accepted) = (0, 0);
     let (mut seconds, mut renders) = (0.0, Vec::new());

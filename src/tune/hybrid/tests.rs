@@ -71,7 +71,7 @@ fn hybrid<'p, C: Clock>(
         clock,
     );
     run.unwrap()
-        .with_starts(&portfolio(&base))
+        .with_starts(&portfolio(&base, metric))
         .with_overhead_limit(f64::INFINITY)
 }
 

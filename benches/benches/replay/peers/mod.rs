@@ -6,30 +6,26 @@ mod python;
 mod simplex;
 mod tpe;
 
-use raywright_benches::recordings::PORTFOLIO;
 use raywright_tuner::{Search, Space};
 
-use crate::methods::Method;
+use crate::methods::{Method, Starts, THREE};
 use driven::Driven;
 use python::Python;
 
 /// What peers that know only costs are told of a failure: worse than anything that was measured.
 const FAILURE: f64 = 100.0;
 
-/// The strong default alone: for those that need a place to begin.
-const STRONG: &[&str] = &["strong8"];
-
 const CRATES: [Method; 6] = [
-    Method::peer("crate tpe", tpe::NAME, &[]),
-    Method::peer("3 starts + crate tpe", tpe::NAME, PORTFOLIO),
-    Method::peer("strong default + crate cmaes", cma_es::NAME, STRONG),
-    Method::peer("3 starts + crate cmaes", cma_es::NAME, PORTFOLIO),
+    Method::peer("crate tpe", tpe::NAME, Starts::Nothing),
+    Method::peer("3 starts + crate tpe", tpe::NAME, THREE),
+    Method::peer("strong default + crate cmaes", cma_es::NAME, Starts::Strong),
+    Method::peer("3 starts + crate cmaes", cma_es::NAME, THREE),
     Method::peer(
         "strong default + crate argmin, simplex",
         simplex::NAME,
-        STRONG,
+        Starts::Strong,
     ),
-    Method::peer("3 starts + crate argmin, simplex", simplex::NAME, PORTFOLIO),
+    Method::peer("3 starts + crate argmin, simplex", simplex::NAME, THREE),
 ];
 
 /// Seeds of those that take a second for a run, and those that take most of a minute.
@@ -39,16 +35,16 @@ const FEWEST: u64 = 1;
 /// Names are those of the script. SMAC's Gaussian process is not among them: a run of 80 frames takes more than
 /// five minutes.
 const SAMPLERS: [Method; 5] = [
-    Method::peer("Optuna TPE", "optuna-tpe", &[]).with_seeds(FEWER),
-    Method::peer("3 starts + Optuna TPE", "optuna-tpe", PORTFOLIO).with_seeds(FEWER),
+    Method::peer("Optuna TPE", "optuna-tpe", Starts::Nothing).with_seeds(FEWER),
+    Method::peer("3 starts + Optuna TPE", "optuna-tpe", THREE).with_seeds(FEWER),
     Method::peer(
         "3 starts + Optuna TPE, multivariate",
         "optuna-tpe-multivariate",
-        PORTFOLIO,
+        THREE,
     )
     .with_seeds(FEWER),
-    Method::peer("3 starts + Optuna GP", "optuna-gp", PORTFOLIO).with_seeds(FEWEST),
-    Method::peer("3 starts + SMAC, forest", "smac-forest", PORTFOLIO).with_seeds(FEWEST),
+    Method::peer("3 starts + Optuna GP", "optuna-gp", THREE).with_seeds(FEWEST),
+    Method::peer("3 starts + SMAC, forest", "smac-forest", THREE).with_seeds(FEWEST),
 ];
 
 /// The peers that can be had.
