@@ -34,6 +34,8 @@ pub struct PredictorParams {
     /// Novelties between which the additive model takes over from the kernel model, 0..=1, the first
     /// below the second; `None`: only while the kernel model knows nothing.
     pub fallback: Option<[f64; 2]>,
+    /// Whether kernel models stay within what they were told in recent frames, and follow no trend beyond.
+    pub bounded: bool,
     /// Costs to begin with.
     pub cold_start: WorkCosts,
     /// Frames that the additive model remembers, from 1.
@@ -51,13 +53,15 @@ impl PredictorParams {
             bias: None,
             speed_memory: None,
             fallback: None,
+            bounded: false,
             cold_start: WorkCosts::default(),
             additive_memory: 64.0,
         }
     }
 
     /// Ours: scaled features, forgetting, a learned correction of the estimate, the speed
-    /// of the machine apart, and the additive model where frames are unlike any before.
+    /// of the machine apart, the additive model where frames are unlike any before, and no trend beyond
+    /// what was seen.
     #[must_use]
     pub fn plus() -> Self {
         let krls = KrlsParams::default().with_limit(128);
@@ -68,6 +72,7 @@ impl PredictorParams {
             bias: Some(krls.with_forgetting(0.98)),
             speed_memory: Some(5.0),
             fallback: Some([0.1, 0.5]),
+            bounded: true,
             cold_start: WorkCosts::default(),
             additive_memory: 64.0,
         }

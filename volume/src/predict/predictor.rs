@@ -222,7 +222,7 @@ impl FramePredictor {
             && samples > 0.0
         {
             let known = model.predict_with_deviation(&features)?;
-            let cost = self.told[COST].bound(known.mean) * COST_UNIT;
+            let cost = self.within_told(COST, known.mean) * COST_UNIT;
             // Nothing learned is 0, and what is far from all that was learned may be negative.
             if cost > 0.0 {
                 novelty = known.novelty;
@@ -261,7 +261,10 @@ impl FramePredictor {
         features: &[f64; FEATURES],
     ) -> Result<Counts, PredictError> {
         let bias = match &self.bias {
-            Some(bias) => self.told[BIAS].bound(bias.predict(features)?),
+            Some(bias) => {
+                let bias = self.within_told(BIAS, bias.predict(features)?);
+                bias.clamp(-MAX_BIAS, MAX_BIAS)
+            }
             None => 0.0,
         };
         let expected = estimated(outlook, quality);
@@ -275,6 +278,14 @@ impl FramePredictor {
             samples: expected.samples * bias.exp(),
             lit: expected.lit * lit,
         })
+    }
+
+    /// What a kernel model says, held within what it was told if so asked for.
+    fn within_told(&self, model: usize, value: f64) -> f64 {
+        match self.params.bounded {
+            true => self.told[model].bound(value),
+            false => value,
+        }
     }
 
     /// Standard deviation of the logarithm of times of known frames.
