@@ -159,8 +159,8 @@ pub(crate) struct TuneArgs {
     /// The axes of the search; canonical with the policy hybrid, printed otherwise
     #[arg(long, value_enum)]
     space: Option<Space>,
-    /// Try known-good parameters first, as the policy hybrid always does: the default, spatial splits, Morton
-    /// order, large leaves
+    /// Try known-good parameters first, as the policy hybrid always does: the default, and what covers
+    /// recordings of six scenes
     #[arg(long)]
     portfolio: bool,
     /// A folder that keeps every trial; what is known there of the same machine, scene and settings is not
