@@ -78,9 +78,11 @@ fn record(
             let mut options = CastOptions::default();
             options.step = step as f32;
             let size = [side; 2];
-            let prepared = estimator.prepare(&moment.function, EstimateMethod::MeanExtinction);
-            let estimate = prepared.estimate(moment.camera, size, &options, index as u32)?;
             let prepared = caster.prepare(&moment.function);
+            let estimate = estimator
+                .prepare(&moment.function, EstimateMethod::MeanExtinction)
+                .with_blocks_of(&prepared)
+                .estimate(moment.camera, size, &options, index as u32)?;
             let mut processor = f64::INFINITY;
             let mut work = Work::default();
             for _ in 0..2 {

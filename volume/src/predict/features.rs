@@ -41,7 +41,7 @@ pub struct FeatureScales {
 impl Default for FeatureScales {
     /// Over the scripted sequences of three volumes (stent, chest, head; 128², 10 frames a second, by a work
     /// clock with 2 % of noise and costs that the predictor does not know; example `predict_sequence`,
-    /// 2026; the logarithm of the cost was learned then) times are off by 6.0 % root mean square at a step of 0.75, by 6.9 % where steps jump between
+    /// 2026; the logarithm of the cost was learned then, and the estimate knew no blocks of a caster) times are off by 6.0 % root mean square at a step of 0.75, by 6.9 % where steps jump between
     /// 0.5 and 2. Without one feature: coarse steps 7.7 and 8.3 %, seen share 6.3 and 7.5, lit share 6.5 and
     /// 7.1, termination 6.3 and 7.2, voxel size 6.7 and 6.8, direction 6.1 and 6.9, step 6.0 and 10.9. All
     /// halved 7.0 and 7.4 %, all doubled 6.8 and 9.4. A running mean of costs in place of the kernel model:
