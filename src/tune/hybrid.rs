@@ -9,7 +9,8 @@
 //! frames take longer or shorter than they did, one probe of the second best tells a change of the scene from
 //! a change of the machine: only in the one the ratio of the two changes, and the search begins again.
 //!
-//! Trials take at most a given share of all time: what would be one too many waits for frames of the incumbent.
+//! Trials take at most a given share of all time, and half of what they saved: what would be one too many waits
+//! for frames of the incumbent, see [`budget`].
 //!
 //! Costs that the search sees are ratios of paired tiles, chained from incumbent to incumbent, times what the
 //! first frame cost: the drift of a machine is in none of them.
@@ -18,6 +19,7 @@
 //! and number of frames alone. A candidate that cannot be built or is hopeless costs its build and 1/32 of
 //! the tiles. Nothing here reads a clock but the stage's.
 
+mod budget;
 mod change;
 mod frame;
 mod report;
@@ -28,7 +30,7 @@ use std::{collections::HashMap, fmt, time::Duration};
 use raywright_bvh::{BuildParams, Bvh};
 use raywright_imaging::{Camera, CancelToken, Film};
 use raywright_tracer::World;
-use raywright_tuner::{ChangeDetector, Config, Outcome, Search, Trial, Tuner};
+use raywright_tuner::{ChangeDetector, Config, Outcome, Reason, Search, Trial, Tuner};
 
 use super::{
     comparison::Comparison,
@@ -36,6 +38,7 @@ use super::{
     space::ParameterSpace,
     stage::{Clock, SessionError, Settings, Stage, add_frame},
 };
+use budget::Budget;
 use frame::Frame;
 pub use report::{Candidate, HybridFrame, Probed};
 
@@ -43,8 +46,8 @@ pub use report::{Candidate, HybridFrame, Probed};
 const LEAST_GAIN: f64 = 0.005;
 const QUIET_PROPOSALS: u32 = 5;
 
-/// The most that trials take of all time, as a share, if nothing else is said.
-pub const DEFAULT_OVERHEAD: f64 = 0.1;
+/// The most that trials take of all time beyond half of what they save, as a share, if nothing else is said.
+pub const DEFAULT_OVERHEAD: f64 = 0.02;
 
 /// New candidates in a row without a new incumbent after which nothing more is tried.
 const PATIENCE: u32 = 12;
@@ -66,8 +69,9 @@ struct Incumbent {
     tree: Bvh,
     /// Seconds of each of its builds.
     builds: Vec<f64>,
-    /// The logarithm of its cost over that of the first incumbent.
+    /// The logarithm of its cost over that of the first incumbent; and by what is sure of each step.
     log_cost: f64,
+    sure_log_cost: f64,
 }
 
 impl Incumbent {
@@ -97,6 +101,8 @@ pub struct Hybrid<'a, C> {
     /// What earlier runs left, until the first frame tells how fast the machine is.
     known: Vec<(Config, Outcome)>,
     film: Film,
+    /// For the samples of the next frame.
+    spare: Option<Film>,
     finished: u32,
     incumbent: Option<Incumbent>,
     /// Seconds that a thread is expected to work for each tile with the incumbent.
@@ -117,11 +123,12 @@ pub struct Hybrid<'a, C> {
     /// that of the incumbent.
     check: Option<(Config, f64)>,
     begun: u64,
-    /// The most that trials may take of all time, as a share.
-    overhead_limit: f64,
-    /// Seconds that trials took beyond frames of the incumbent alone, and seconds of all frames.
-    overhead: f64,
-    spent: f64,
+    /// What trials may take.
+    budget: Budget,
+    /// That of the first incumbent of this search: `Incumbent::sure_log_cost`.
+    first_sure_log_cost: f64,
+    /// A trial that waits for time.
+    waiting: Option<Trial>,
 }
 
 impl<'a, C: Clock> Hybrid<'a, C> {
@@ -153,6 +160,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             starts: Vec::new(),
             known: Vec::new(),
             film,
+            spare: None,
             finished: 0,
             incumbent: None,
             unit: 0.0,
@@ -164,9 +172,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             detector: ChangeDetector::new(LEAST_NOISE),
             check: None,
             begun: 0,
-            overhead_limit: DEFAULT_OVERHEAD,
-            overhead: 0.0,
-            spent: 0.0,
+            budget: Budget::new(DEFAULT_OVERHEAD),
+            first_sure_log_cost: 0.0,
+            waiting: None,
         })
     }
 
@@ -177,11 +185,12 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self
     }
 
-    /// The same run, in which trials (builds and slower tiles) take at most this share of all time so far; a
-    /// trial that would be one too many waits. [`DEFAULT_OVERHEAD`] otherwise; infinite: nothing waits.
+    /// The same run, in which trials (builds and slower tiles) take at most this share of all time so far, or of
+    /// 120 frames if there were fewer, and half of what better trees saved; a trial that would be one too many
+    /// waits. [`DEFAULT_OVERHEAD`] otherwise; 0: nothing is tried; infinite: nothing waits.
     #[must_use]
     pub fn with_overhead_limit(mut self, share: f64) -> Self {
-        self.overhead_limit = share;
+        self.budget.share = share;
         self
     }
 
@@ -218,12 +227,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         begins: impl FnOnce(&Trial),
     ) -> Result<Option<HybridFrame>, SessionError> {
         let mut start = self.stage.now();
-        let mut frame = Frame::new(
-            self.stage.film()?,
-            self.stage.tiles(),
-            self.finished,
-            cancel,
-        );
+        // Memory that is new costs more than a sample of each pixel.
+        let film = self.spare.take().map_or_else(|| self.stage.film(), Ok)?;
+        let mut frame = Frame::new(film, self.stage.tiles(), self.finished, cancel);
         let Some(mut incumbent) = self.incumbent.take() else {
             return self.first_frame(frame, start, begins);
         };
@@ -253,12 +259,15 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         self.watch(&frame.times);
         add_frame(&mut self.film, &frame.film);
+        self.spare = Some(frame.film);
         self.finished += 1;
         let time = self.stage.now() - start;
-        self.spent += time.as_secs_f64();
-        if candidate.is_some() {
-            self.overhead += (time.as_secs_f64() - rebuild - usual).max(0.0);
-        }
+        let lost = match candidate {
+            Some(_) => (time.as_secs_f64() - rebuild - usual).max(0.0),
+            None => 0.0,
+        };
+        let saved = self.saved_by_frame();
+        self.budget.add_frame(time.as_secs_f64(), lost, saved);
         Ok(Some(HybridFrame {
             candidate,
             time,
@@ -299,6 +308,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             tree,
             builds: vec![build.as_secs_f64()],
             log_cost: 0.0,
+            sure_log_cost: 0.0,
         };
         self.incumbent = Some(incumbent);
         self.unit = self.incumbent_cost().unwrap_or(0.0);
@@ -308,9 +318,11 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             self.tuner.add_new_start(config);
         }
         add_frame(&mut self.film, &frame.film);
+        self.spare = Some(frame.film);
         self.finished += 1;
         let time = self.stage.now() - start;
-        self.spent = time.as_secs_f64();
+        self.budget.begin(self.unit);
+        self.budget.add_frame(time.as_secs_f64(), 0.0, 0.0);
         Ok(Some(HybridFrame {
             candidate: None,
             time,
@@ -372,11 +384,30 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         Ok(time)
     }
 
-    /// What is tried in the next frame.
+    /// What is tried in the next frame: what is wished, unless it is too dear yet.
     fn next_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
-        if self.is_frozen || self.overhead > self.overhead_limit * self.spent {
+        if self.is_frozen {
             return Ok(None);
         }
+        let trial = match self.waiting.take() {
+            Some(trial) => trial,
+            None => match self.wished_trial(incumbent)? {
+                Some(trial) => trial,
+                None => return Ok(None),
+            },
+        };
+        let quality = self.space.params(&trial.config).quality;
+        let (own, build) = (incumbent.params.quality, incumbent.build());
+        let expected = self.budget.expected_build(quality, own, build);
+        if self.budget.allows(expected, trial.reason == Reason::Start) {
+            return Ok(Some(trial));
+        }
+        self.waiting = Some(trial);
+        Ok(None)
+    }
+
+    /// What would be tried next if it cost nothing.
+    fn wished_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
         if let Some((config, _)) = &self.check {
             return Ok(Some(self.tuner.ask_for(config)));
         }
@@ -454,6 +485,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let incumbent = self.incumbent.as_ref()?;
         let metric = self.stage.settings.metric;
         Some(metric.cost(incumbent.build(), self.render_time()))
+    }
+
+    /// Seconds by which a frame surely costs less than with the first incumbent of this search: what was accepted
+    /// seems better than it is, since others were not.
+    fn saved_by_frame(&self) -> f64 {
+        let log_cost = self.incumbent.as_ref().map_or(0.0, |own| own.sure_log_cost);
+        let cost = self.incumbent_cost().unwrap_or(0.0);
+        cost * (self.first_sure_log_cost - log_cost).exp_m1()
     }
 
     /// Seconds that a frame is expected to take to render with the incumbent.

@@ -11,7 +11,7 @@ use std::{
 
 use raywright_bvh::{BuildError, BuildParams, BuildWorkspace, Bvh};
 use raywright_imaging::{
-    Camera, CameraError, CancelToken, Completion, Film, FilmError, TileLoop,
+    Camera, CameraError, CancelToken, Completion, Film, FilmError, Pixel, TileLoop,
     tiles::DEFAULT_TILE_SIZE,
 };
 use raywright_tracer::{Integrator, Rgb, Shot, World};
@@ -251,8 +251,8 @@ impl<'a, C: Clock> Stage<'a, C> {
             .tiles(self.settings.width, self.settings.height)
     }
 
-    /// Adds one sample to every pixel of those tiles for which there is a tree; what a thread
-    /// worked for each, in seconds. After `limit` no further tile is begun, nor after a cancellation.
+    /// One sample of every pixel of those tiles for which there is a tree, in place of what the film had there;
+    /// what a thread worked for each, in seconds. After `limit` no further tile is begun, nor after a cancellation.
     pub(super) fn render_tiles<'t>(
         &self,
         film: &mut Film,
@@ -274,6 +274,9 @@ impl<'a, C: Clock> Stage<'a, C> {
                 return;
             }
             let start = self.clock.busy();
+            for (x, y) in tile.pixels() {
+                *view.pixel_mut(x, y) = Pixel::default();
+            }
             shot.render_tile(&projection, tile, view, sample..sample + 1, tree);
             let time = (self.clock.busy() - start).as_secs_f64();
             let mut times = times.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,8 +1,9 @@
 //! `raywright study gains`: what tuning gains on real frames, and what it costs on the way.
 //!
 //! For each scene, metric, space and seed a run of `tune::Hybrid`, and then its result beside both defaults in
-//! turns. A gain is 1 − tuned ÷ default; against the weak default it is never told alone. What all frames of
-//! a run took together stands beside what they would have taken with the strong default from the beginning.
+//! turns. A gain is 1 − tuned ÷ default; against the weak default it is never told alone. A twin that tries
+//! nothing renders the same frames with the strong default, in turns with the run: what all frames took
+//! together stands beside what they took it.
 
 use std::{fmt::Write as _, fs, path::PathBuf};
 
@@ -170,18 +171,22 @@ fn one(
     let space = ParameterSpace::new(&strong, &[], axes.axes())?;
     let search = || -> Box<dyn Search> { Box::new(GaussianProcess::new()) };
     let (world, camera) = (&stage.world, stage.camera);
-    let clock = WallClock::start();
-    let hybrid = Hybrid::new(world, camera, settings, space, &strong, search, clock)?;
-    let mut hybrid = hybrid
+    let run = || {
+        let (space, clock) = (space.clone(), WallClock::start());
+        Hybrid::new(world, camera, settings, space, &strong, search, clock)
+    };
+    let mut twin = run()?.frozen();
+    let mut hybrid = run()?
         .with_starts(&portfolio(&strong, metric))
         .with_overhead_limit(args.overhead);
     let (mut tried, mut accepted) = (0, 0);
-    let (mut seconds, mut renders) = (0.0, Vec::new());
+    let (mut seconds, mut usual, mut renders) = (0.0, 0.0, Vec::new());
     for _ in 0..args.frames {
-        let Some(frame) = hybrid.frame(cancel)? else {
+        let (Some(frame), Some(other)) = (hybrid.frame(cancel)?, twin.frame(cancel)?) else {
             return Ok(None);
         };
         seconds += frame.time.as_secs_f64();
+        usual += other.time.as_secs_f64();
         renders.push((frame.time.saturating_sub(frame.build)).as_secs_f64());
         if let Some(candidate) = frame.candidate {
             tried += 1;
@@ -204,13 +209,6 @@ fn one(
         let ratios = own.iter().zip(others).map(|(own, other)| own / other);
         median(ratios.collect())
     };
-    let builds = comparison.rows[2].rounds.iter();
-    let build = match metric {
-        // Built once; the total bears it in each frame.
-        Metric::Render => median(builds.map(|times| times.build.as_secs_f64()).collect()),
-        _ => 0.0,
-    };
-    let usual = build + f64::from(args.frames) * median(strong_costs.clone()) * 1e-3;
     let rest = renders.split_off(1);
     let longest = rest.iter().copied().fold(0.0, f64::max);
     Ok(Some(Run {

@@ -78,6 +78,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         self.probed.clear();
         (self.quiet, self.fruitless) = (0, 0);
+        self.waiting = None;
+        self.first_sure_log_cost = incumbent.sure_log_cost;
+        self.budget.begin(cost);
         self.is_searching = true;
     }
 

@@ -12,7 +12,7 @@ use crate::tune::stage::{Clock, SessionError};
 
 /// A frame that is being rendered.
 pub(super) struct Frame<'c> {
-    /// One sample of each pixel of the tiles that are done.
+    /// One sample of each pixel of the tiles that are done; the others are undefined.
     pub(super) film: Film,
     /// The number of its sample.
     pub(super) sample: u32,
@@ -23,7 +23,7 @@ pub(super) struct Frame<'c> {
 }
 
 impl<'c> Frame<'c> {
-    /// A frame of which nothing is rendered.
+    /// A frame of which nothing is rendered, whatever there is in the film.
     pub(super) fn new(film: Film, tiles: usize, sample: u32, cancel: &'c CancelToken) -> Self {
         Self {
             film,

@@ -148,6 +148,9 @@ impl<C: Clock> Hybrid<'_, C> {
         build: Duration,
     ) -> Result<Result<Probed, TrialFailure>, SessionError> {
         let costs = self.costs(incumbent, build.as_secs_f64());
+        let own = (incumbent.params.quality, incumbent.build());
+        self.budget
+            .add_build(params.quality, build.as_secs_f64(), own.0, own.1);
         // What is to be seen by a check is whether what was known still holds.
         let is_check = self.check.is_some();
         let before = self.probed.get(&trial.canonical).copied();
@@ -196,6 +199,7 @@ impl<C: Clock> Hybrid<'_, C> {
             incumbent.params = params;
             incumbent.builds = vec![build.as_secs_f64()];
             incumbent.log_cost += costs.ratio(factor).ln();
+            incumbent.sure_log_cost += costs.bounds(probe.all)[2].ln().min(0.0);
             self.probed.clear();
             self.quiet = 0;
             self.detector = ChangeDetector::new(LEAST_NOISE);
@@ -228,10 +232,15 @@ impl<C: Clock> Hybrid<'_, C> {
         let (mut candidate_times, mut incumbent_times) = (Vec::new(), Vec::new());
         let mut found = Err(TrialFailure::Unmeasured);
         let mut begin = 0;
-        for share in SHARES {
+        for (index, share) in SHARES.into_iter().enumerate() {
             let end = 2 * ((share * order.len() as f64) as usize).min(order.len() / 2);
             let part = &order[begin.min(end)..end];
             begin = end;
+            // A tree that was built just now lies in the caches, and the other does not: the first tiles say
+            // whether the candidate is hopeless, and no more.
+            if index == 1 {
+                pairs.clear();
+            }
             // Even ones are the candidate's.
             let mut trees: Vec<Option<&Bvh>> = vec![None; order.len()];
             for pair in part.chunks_exact(2) {
