@@ -148,8 +148,8 @@ pub(crate) struct TuneArgs {
     /// How frames are used
     #[arg(long, value_enum, default_value_t = Policy::Hybrid)]
     policy: Policy,
-    /// The most that trials may take of all time with the policy hybrid, as a share; what would be one too
-    /// many waits. 1 and more: none waits long
+    /// The most that trials may take with the policy hybrid beyond half of what they save, as a share of all time
+    /// or of 120 frames; what would be one too many waits. 0: nothing is tried; 1 and more: none waits long
     #[arg(long, default_value_t = SEARCH_OVERHEAD, value_parser = share)]
     overhead: f64,
     /// With the policy paper and a store: take what this predictor names for the state of the scene, from what

@@ -389,7 +389,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         if self.is_frozen {
             return Ok(None);
         }
-        let trial = match self.waiting.take() {
+        let mut waiting = self.waiting.take();
+        // A check goes first, and is taken for nothing else.
+        if self.check.is_some()
+            && let Some(trial) = waiting.take()
+        {
+            self.tell(&trial, Outcome::Cancelled)?;
+        }
+        let trial = match waiting {
             Some(trial) => trial,
             None => match self.wished_trial(incumbent)? {
                 Some(trial) => trial,

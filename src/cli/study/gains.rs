@@ -49,7 +49,7 @@ pub(crate) struct GainsArgs {
     /// Scattering events of a path, K
     #[arg(long, default_value_t = Integrator::DEFAULT_PATH_LENGTH)]
     path_length: u32,
-    /// The most that trials may take of all time, as a share
+    /// The most that trials may take beyond half of what they save, as a share of all time or of 120 frames
     #[arg(long, default_value_t = DEFAULT_OVERHEAD)]
     overhead: f64,
     /// What is made small

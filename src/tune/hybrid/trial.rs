@@ -267,6 +267,12 @@ impl<C: Clock> Hybrid<'_, C> {
             if let Some(ratio) = ProbeRatio::of(&pairs) {
                 let all = before.map_or(ratio, |before| before.and(ratio));
                 let decision = costs.decide(all);
+                let is_first = index == 0 && decision == Decision::Accepted;
+                let decision = if is_first {
+                    Decision::Undecided
+                } else {
+                    decision
+                };
                 found = Ok((ratio, all, decision));
                 if decision != Decision::Undecided {
                     break;
