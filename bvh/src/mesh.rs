@@ -89,6 +89,37 @@ impl TriangleMesh {
         })
     }
 
+    /// The same of triangles some of which may use a vertex that is not finite: these keep their number and are
+    /// never hit. Also how many there are.
+    ///
+    /// # Errors
+    /// The first triangle with an index out of range.
+    pub fn skipping_non_finite(
+        mut vertices: Vec<Vec3>,
+        mut triangles: Vec<[u32; 3]>,
+    ) -> Result<(Self, usize), MeshError> {
+        let is_finite = |corners: &[u32; 3]| {
+            let mut corners = corners.iter().map(|&index| vertices.get(index as usize));
+            corners.all(|vertex| vertex.is_none_or(|vertex| vertex.is_finite()))
+        };
+        let skipped: Vec<usize> = (0..triangles.len())
+            .filter(|&triangle| !is_finite(&triangles[triangle]))
+            .collect();
+        // A point that a triangle has anyway changes no bounds.
+        let mut sound = triangles.iter().filter(|corners| is_finite(corners));
+        let point = match sound.next() {
+            Some(&[point, ..]) => point,
+            None => vertices.len() as u32,
+        };
+        if !skipped.is_empty() && point as usize == vertices.len() {
+            vertices.push(Vec3::ZERO);
+        }
+        for &triangle in &skipped {
+            triangles[triangle] = [point; 3];
+        }
+        Ok((Self::new(vertices, triangles)?, skipped.len()))
+    }
+
     /// The vertex positions.
     #[must_use]
     pub fn vertices(&self) -> &[Vec3] {
@@ -143,6 +174,24 @@ mod tests {
                 })
             );
         }
+    }
+
+    #[test]
+    fn triangles_with_vertices_that_are_not_finite_are_skipped_and_keep_their_number() {
+        let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.0, f32::NAN, 0.0)];
+        let skipping = |triangles| TriangleMesh::skipping_non_finite(vertices.clone(), triangles);
+        let (mesh, skipped) = skipping(vec![[0, 1, 3], [1, 2, 0], [3, 3, 3]]).unwrap();
+        assert_eq!(skipped, 2);
+        assert_eq!(mesh.triangles(), [[1; 3], [1, 2, 0], [1; 3]]);
+        let (mesh, skipped) = skipping(vec![[3, 0, 1]]).unwrap();
+        assert_eq!((skipped, mesh.corners(0)), (1, [Vec3::ZERO; 3]));
+        let (mesh, skipped) = skipping(vec![[0, 1, 2]]).unwrap();
+        assert_eq!((skipped, mesh.vertices().len()), (0, 4));
+        let got = skipping(vec![[3, 0, 1], [0, 1, 7]]);
+        assert!(matches!(
+            got,
+            Err(MeshError::IndexOutOfRange { triangle: 1, .. })
+        ));
     }
 
     #[test]

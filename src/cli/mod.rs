@@ -11,6 +11,7 @@ mod run_options;
 mod scene;
 mod store;
 mod study;
+mod trace;
 mod tune;
 mod volume;
 
@@ -42,6 +43,9 @@ enum Command {
     /// Show counts, bounds, indicators and tree statistics of a scene
     #[command(after_long_help = run_options::parameter_help())]
     Inspect(inspect::InspectArgs),
+    /// Trace rays from a file and write what they hit
+    #[command(after_long_help = run_options::parameter_help())]
+    Trace(trace::TraceArgs),
     /// Tune a built-in scene and leave a picture and a report: needs no file, takes about a minute
     Demo(demo::DemoArgs),
     /// What tuning left in a folder of logs: look, check, merge, export
@@ -61,6 +65,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), Failure> {
         Command::Render(args) => render::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Trace(args) => trace::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Store(command) => store::run(&command),
         Command::Study(command) => study::run(&command),

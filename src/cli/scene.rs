@@ -6,7 +6,7 @@ use clap::Args;
 use raywright::{
     bvh::{BuildParams, Bvh, Vec3},
     imaging::Camera,
-    tracer::{World, automatic_camera, dark_distance, generate, load::load_scene},
+    tracer::{Scene, World, automatic_camera, dark_distance, generate, load::load_scene},
 };
 
 use super::{Failure, output};
@@ -55,25 +55,8 @@ impl SceneOptions {
 
     /// Loads or generates the scene, and tells on standard error what the user should know.
     pub(crate) fn prepare(&self) -> Result<Stage, Failure> {
-        let path = Path::new(&self.scene);
         let mut notes = Vec::new();
-        let (name, mut scene) = match generate::by_name(&self.scene) {
-            Some(scene) if !path.exists() => (self.scene.clone(), scene),
-            _ => {
-                let loaded = load_scene(path).map_err(|error| match path.exists() {
-                    true => Failure::from(error),
-                    false => Failure::with_hint(
-                        error,
-                        format!(
-                            "give a file, or a built-in scene: {}",
-                            generate::NAMES.join(", ")
-                        ),
-                    ),
-                })?;
-                notes.extend(loaded.warnings.iter().map(ToString::to_string));
-                (stem(path), loaded.scene)
-            }
-        };
+        let (name, mut scene) = self.load(&mut notes)?;
         let dark = scene.is_dark();
         if dark {
             notes.push("the scene has no lights: it gets a sky and a sun".into());
@@ -102,6 +85,38 @@ impl SceneOptions {
             camera,
             notes,
         })
+    }
+
+    /// The scene as it is, without lights that it lacks; tells on standard error what the user should know.
+    pub(crate) fn world(&self) -> Result<World, Failure> {
+        let mut notes = Vec::new();
+        let (_, scene) = self.load(&mut notes)?;
+        for note in &notes {
+            output::note(format_args!("note: {note}"));
+        }
+        Ok(World::new(scene))
+    }
+
+    /// Loads or generates the scene; its name.
+    fn load(&self, notes: &mut Vec<String>) -> Result<(String, Scene), Failure> {
+        let path = Path::new(&self.scene);
+        match generate::by_name(&self.scene) {
+            Some(scene) if !path.exists() => Ok((self.scene.clone(), scene)),
+            _ => {
+                let loaded = load_scene(path).map_err(|error| match path.exists() {
+                    true => Failure::from(error),
+                    false => Failure::with_hint(
+                        error,
+                        format!(
+                            "give a file, or a built-in scene: {}",
+                            generate::NAMES.join(", ")
+                        ),
+                    ),
+                })?;
+                notes.extend(loaded.warnings.iter().map(ToString::to_string));
+                Ok((stem(path), loaded.scene))
+            }
+        }
     }
 
     fn camera(&self, world: &World, tree: &Bvh) -> Result<Camera, Failure> {

@@ -1,8 +1,16 @@
-//! The closest hit in f64, without a tree: where a kernel in f32 may be wrong, and by how much.
+//! All hits in f64, without a tree: where a kernel in f32 may be wrong, and by how much.
 //!
-//! A hit is told apart by how surely it is one: the smallest barycentric weight says how far the
-//! ray passes from an edge.
+//! A triangle is hit if and only if the ray meets it exactly, edges and vertices included: sides of edges are told
+//! by f64 where rounding cannot matter, and by integers else (after Shewchuk, *Adaptive Precision Floating-Point
+//! Arithmetic and Fast Robust Geometric Predicates*, 1997, with integers in place of expansions). A hit is told apart by how surely
+//! it is one: the smallest barycentric weight says how far the ray passes from an edge.
+//!
+//! Invariant: of triangles that share an edge, a ray that passes between their other corners meets at least one.
 
+use std::cmp::Ordering;
+
+use glam::DVec3;
+use num_bigint::BigInt;
 use raywright_bvh::{Ray, TriangleMesh, Vec3};
 
 /// A hit computed in f64.
@@ -46,19 +54,111 @@ pub fn all_hits(meshes: &[&TriangleMesh], ray: &Ray) -> Vec<ExactHit> {
     hits
 }
 
-/// Cramer's rule on o + t·d = v0 + u·(v1 − v0) + v·(v2 − v0).
-fn triangle([v0, v1, v2]: [Vec3; 3], ray: &Ray) -> Option<(f64, [f64; 2])> {
-    let [a, b, c, origin, direction] = [v0, v1, v2, ray.origin, ray.direction].map(Vec3::as_dvec3);
-    let (ab, ac, ao) = (b - a, c - a, origin - a);
-    let determinant = ab.cross(ac).dot(-direction);
-    if determinant == 0.0 {
+/// Distance and weights of vertices 1 and 2, if the ray meets the triangle. Which side of each edge the ray
+/// passes is exact; the numbers are as good as f64 makes them.
+///
+/// With corners A, B, C as seen from the origin and direction D, the weights are to each other as D·(B×C),
+/// D·(C×A) and D·(A×B).
+fn triangle(corners: [Vec3; 3], ray: &Ray) -> Option<(f64, [f64; 2])> {
+    let edges = edges(corners, ray);
+    if !are_met(&edges, ray) {
         return None;
     }
-    let u = ao.cross(ac).dot(-direction) / determinant;
-    let v = ab.cross(ao).dot(-direction) / determinant;
-    let t = ab.cross(ac).dot(ao) / determinant;
-    let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-    (inside && f64::from(ray.t_min) <= t && t <= f64::from(ray.t_max)).then_some((t, [u, v]))
+    let weights = edges.map(|edge| edge.value);
+    let sum: f64 = weights.iter().sum();
+    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    let normal = (v1 - v0).cross(v2 - v0);
+    let to_plane = normal.dot(v0 - ray.origin.as_dvec3());
+    let t = to_plane / normal.dot(ray.direction.as_dvec3());
+    let is_within = f64::from(ray.t_min) <= t && t <= f64::from(ray.t_max);
+    is_within.then(|| (t, [weights[1] / sum, weights[2] / sum]))
+}
+
+/// Whether the line of a ray meets a triangle, its border included.
+#[must_use]
+pub fn is_met(corners: [Vec3; 3], ray: &Ray) -> bool {
+    are_met(&edges(corners, ray), ray)
+}
+
+/// The edges opposite to vertices 0, 1, 2.
+fn edges(corners: [Vec3; 3], ray: &Ray) -> [Edge; 3] {
+    [0, 1, 2].map(|i| Edge::new(corners[(i + 1) % 3], corners[(i + 2) % 3], ray))
+}
+
+fn are_met(edges: &[Edge; 3], ray: &Ray) -> bool {
+    let signs = edges.map(|edge| edge.sign(ray));
+    // All zero: the ray lies in the plane, or the triangle has no area.
+    signs.contains(&Ordering::Greater) != signs.contains(&Ordering::Less)
+}
+
+/// An edge of a triangle, beside a ray.
+#[derive(Clone, Copy)]
+struct Edge {
+    ends: [Vec3; 2],
+    /// D·(P×Q) for the ends P and Q as seen from the origin.
+    value: f64,
+    /// The sum of the magnitudes of its terms.
+    magnitude: f64,
+}
+
+/// A value is off by less than ten roundings of its terms.
+const SURE: f64 = 1e-14;
+
+impl Edge {
+    fn new(p: Vec3, q: Vec3, ray: &Ray) -> Self {
+        let [origin, direction] = [ray.origin, ray.direction].map(Vec3::as_dvec3);
+        let [from, to] = [p, q].map(|end| end.as_dvec3() - origin);
+        let magnitude = |x: DVec3| x.abs();
+        let [d, f, t] = [direction, from, to].map(magnitude);
+        Self {
+            ends: [p, q],
+            value: direction.dot(from.cross(to)),
+            magnitude: d.x * (f.y * t.z + f.z * t.y)
+                + d.y * (f.z * t.x + f.x * t.z)
+                + d.z * (f.x * t.y + f.y * t.x),
+        }
+    }
+
+    /// On which side of the edge the ray passes: that of the value if it is surely not 0, else by integers.
+    fn sign(&self, ray: &Ray) -> Ordering {
+        if self.value.abs() > SURE * self.magnitude {
+            return self.value.total_cmp(&0.0);
+        }
+        self.exact_sign(ray)
+    }
+
+    /// The same by integers: every f32 is one, times 2⁻¹⁴⁹.
+    fn exact_sign(&self, ray: &Ray) -> Ordering {
+        let integers = |v: Vec3| v.to_array().map(integer);
+        let [origin, direction] = [ray.origin, ray.direction].map(integers);
+        let [p, q] = self.ends.map(|end| {
+            let end = integers(end);
+            [0, 1, 2].map(|axis| &end[axis] - &origin[axis])
+        });
+        let sum: BigInt = (0..3)
+            .map(|x| {
+                let (y, z) = ((x + 1) % 3, (x + 2) % 3);
+                &direction[x] * (&p[y] * &q[z] - &p[z] * &q[y])
+            })
+            .sum();
+        sum.cmp(&BigInt::ZERO)
+    }
+}
+
+/// `value` · 2¹⁴⁹; 0 if it is not finite.
+fn integer(value: f32) -> BigInt {
+    let bits = value.to_bits();
+    let (exponent, fraction) = ((bits >> 23) & 0xff, bits & 0x7f_ffff);
+    let magnitude = match exponent {
+        0 => BigInt::from(fraction),
+        0xff => BigInt::ZERO,
+        _ => BigInt::from(fraction | 0x80_0000) << (exponent - 1),
+    };
+    if value.is_sign_negative() {
+        -magnitude
+    } else {
+        magnitude
+    }
 }
 
 #[cfg(test)]
@@ -79,5 +179,81 @@ mod tests {
             (1.5, [0.25, 0.25], 0.25)
         );
         assert!(all_hits(&[&mesh], &ray.with_range(0.0, 1.4)).is_empty());
+    }
+
+    #[test]
+    fn integers_are_the_numbers() {
+        for value in [0.0, 1.5, -2.75, 1e-45, -3e-39, f32::MAX, f32::MIN_POSITIVE] {
+            let expected = f64::from(value) * 2.0_f64.powi(149);
+            let digits = integer(value).to_string();
+            assert_eq!(digits.parse::<f64>().unwrap(), expected, "{value}");
+        }
+        assert_eq!(integer(f32::INFINITY), BigInt::ZERO);
+    }
+
+    /// Numbers of many sizes, from a linear congruence.
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 12345_u64;
+        move || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            let unit = (state >> 40) as f32 / (1 << 24) as f32 - 0.5;
+            unit * f32::powi(2.0, ((state >> 35) & 15) as i32 - 8)
+        }
+    }
+
+    #[test]
+    fn both_ways_to_a_sign_agree() {
+        let mut number = numbers();
+        let mut vector = || Vec3::new(number(), number(), number());
+        let mut unsure = 0;
+        for _ in 0..20_000 {
+            let (p, q) = (vector(), vector());
+            // Toward a point of the edge, so that signs are not all sure.
+            let origin = vector();
+            let ray = Ray::new(origin, p + 0.25 * (q - p) - origin);
+            let edge = Edge::new(p, q, &ray);
+            unsure += u32::from(edge.value.abs() <= SURE * edge.magnitude);
+            assert_eq!(edge.sign(&ray), edge.exact_sign(&ray));
+            // Seen from the other triangle at the edge.
+            assert_eq!(Edge::new(q, p, &ray).sign(&ray), edge.sign(&ray).reverse());
+        }
+        assert!(unsure > 0);
+    }
+
+    #[test]
+    fn a_ray_at_a_shared_edge_meets_one_triangle_at_least() {
+        let mut number = numbers();
+        let mut vector = || Vec3::new(number(), number(), number());
+        let mut both = 0;
+        for _ in 0..5_000 {
+            let [p, q, right] = [vector(), vector(), vector()];
+            let on_edge = p + 0.5 * (q - p);
+            // On the other side of the edge.
+            let left = on_edge + (on_edge - right) * 0.75;
+            let mesh = TriangleMesh::new(vec![p, q, right, left], vec![[0, 1, 2], [1, 0, 3]]);
+            let origin = vector() * 4.0;
+            let ray = Ray::new(origin, on_edge - origin);
+            let hits = all_hits(&[&mesh.unwrap()], &ray);
+            assert!(!hits.is_empty());
+            both += u32::from(hits.len() == 2);
+        }
+        assert!(both > 0);
+    }
+
+    #[test]
+    fn corners_and_edges_belong_and_planes_do_not() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 1, 1]]).unwrap();
+        let down = |x: f32, y: f32| Ray::new([x, y, 1.0], [0.0, 0.0, -1.0]);
+        let hits = |ray: &Ray| all_hits(&[&mesh], ray).len();
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5)] {
+            assert_eq!(hits(&down(x, y)), 1, "{x} {y}");
+        }
+        // The next number beyond.
+        assert_eq!(hits(&down(0.5, 0.5_f32.next_up())), 0);
+        assert_eq!(hits(&down(0.5, 0.0_f32.next_down())), 0);
+        assert_eq!(hits(&Ray::new([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0])), 0);
     }
 }

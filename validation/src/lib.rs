@@ -4,7 +4,8 @@
 //! | module | question | oracle |
 //! | --- | --- | --- |
 //! | [`z_test`] | do two pictures have the same mean? | statistics |
-//! | [`exact`] | where does a ray hit a triangle? | f64 |
+//! | [`exact`] | where does a ray hit a triangle? | f64, integers for the sides of edges |
+//! | [`hits`] | is what two tracers say of a ray the same, a tie or a fault? | [`exact`] and bounds of errors |
 //! | [`golden`] | is a tree Embree's, to the last bit? | hashes of Embree's trees, in files |
 //! | [`embree`] | the same, for any input and parameters | the library itself, if it is there |
 //! | [`random`] | the same, over many | random triangles and parameters |
@@ -25,6 +26,8 @@ pub mod embree;
 pub mod exact;
 #[cfg(feature = "golden")]
 pub mod golden;
+#[cfg(feature = "golden")]
+pub mod hits;
 #[cfg(all(feature = "embree", feature = "golden"))]
 pub mod random;
 pub mod tree;

@@ -1,5 +1,6 @@
 //! Subcommands, one file each.
 
+mod hits;
 mod random;
 mod rebuilds;
 mod table;
@@ -22,6 +23,8 @@ pub(crate) struct Cli {
 enum Command {
     /// Compare our trees with those of Embree's rtcBuildBVH, to the last bit
     Trees(trees::TreesArgs),
+    /// Compare our hits with Embree's and with exact ones, and say what each difference is
+    Hits(hits::HitsArgs),
     /// Build a scene again and again, and see whether memory grows
     Rebuilds(rebuilds::RebuildsArgs),
 }
@@ -37,6 +40,7 @@ pub(crate) enum Verdict {
 pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
     match cli.command {
         Command::Trees(args) => trees::run(&args),
+        Command::Hits(args) => hits::run(&args),
         Command::Rebuilds(args) => rebuilds::run(&args),
     }
 }

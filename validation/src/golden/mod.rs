@@ -11,6 +11,7 @@
 //!   references alone, because Embree itself gives them another tree on another number of cores;
 //! - lines marked `rcp` only on processors with the reciprocal estimate of the golden machine.
 
+mod cases;
 mod compare;
 mod figures;
 mod hash;
@@ -22,6 +23,7 @@ mod sets;
 
 use std::path::PathBuf;
 
+pub use cases::{Case, Expectation, GoldenRay, Refusal, read_cases};
 pub use compare::{Outcome, build, compare, parameters, split_budget};
 pub use figures::Figures;
 pub use hash::{Fnv, ordered, unordered};
