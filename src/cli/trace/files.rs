@@ -10,7 +10,6 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail};
-use npyz::{NpyFile, Order, TypeChar, WriterBuilder};
 use raywright::bvh::{Hit, Ray};
 
 use super::super::Failure;
@@ -141,36 +140,67 @@ fn csv_rows(file: impl Read) -> anyhow::Result<Rows> {
     })
 }
 
-fn npy_rows(file: impl Read) -> anyhow::Result<Rows> {
-    let array = NpyFile::new(file).context("no array of NumPy")?;
-    let &[_, columns] = array.shape() else {
-        bail!(
-            "an array of {} dimensions: there must be two",
-            array.shape().len()
-        );
+/// The first bytes of an array of NumPy.
+const NPY_MAGIC: &[u8] = b"\x93NUMPY";
+
+/// NumPy Enhancement Proposal 1: magic, version, length of a header, which is a literal of Python, numbers.
+fn npy_rows(mut file: impl Read) -> anyhow::Result<Rows> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    let (header, data) = npy_parts(&bytes).context("no array of NumPy")?;
+    let field = |name: &str| {
+        let place = header.split_once(&format!("'{name}':"));
+        let place = place.with_context(|| format!("an array of NumPy without {name}"));
+        place.map(|(_, rest)| rest.trim_start())
     };
-    let columns = usize::try_from(columns)?;
+    let kind = field("descr")?.split('\'').nth(1).unwrap_or_default();
+    let is_fortran = field("fortran_order")?.starts_with("True");
+    let shape = field("shape")?.split(['(', ')']).nth(1).unwrap_or_default();
+    let sides = shape
+        .split(',')
+        .map(str::trim)
+        .filter(|side| !side.is_empty());
+    let sides: Vec<usize> = sides.map(str::parse).collect::<Result<_, _>>()?;
+    let &[rows, columns] = &sides[..] else {
+        bail!("an array of {} dimensions: there must be two", sides.len());
+    };
     check_columns(columns)?;
-    let order = array.order();
-    let dtype = array.dtype();
-    let npyz::DType::Plain(kind) = &dtype else {
-        bail!("an array of records: its numbers must be f4 or f8");
+    let mut values: Vec<f64> = match kind {
+        "<f4" => numbers(data, |b| f64::from(f32::from_le_bytes(b))),
+        ">f4" => numbers(data, |b| f64::from(f32::from_be_bytes(b))),
+        "<f8" => numbers(data, f64::from_le_bytes),
+        ">f8" => numbers(data, f64::from_be_bytes),
+        _ => bail!("numbers of type {kind}: they must be f4 or f8"),
     };
-    let mut values: Vec<f64> = match (kind.type_char(), kind.size_field()) {
-        (TypeChar::Float, 4) => {
-            let values = array.into_vec::<f32>()?;
-            values.into_iter().map(f64::from).collect()
-        }
-        (TypeChar::Float, 8) => array.into_vec()?,
-        _ => bail!("numbers of type {}: they must be f4 or f8", dtype.descr()),
-    };
-    if order == Order::Fortran {
-        let rows = values.len() / columns;
+    if rows.checked_mul(columns) != Some(values.len()) {
+        bail!("{} numbers for {rows} rows of {columns}", values.len());
+    }
+    if is_fortran {
         values = (0..values.len())
             .map(|place| values[place % columns * rows + place / columns])
             .collect();
     }
     Ok(Rows { columns, values })
+}
+
+/// Header and data of an array.
+fn npy_parts(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let rest = bytes.strip_prefix(NPY_MAGIC)?;
+    let (version, rest) = rest.split_at_checked(2)?;
+    let (length, rest) = if version[0] == 1 {
+        let (length, rest) = rest.split_first_chunk()?;
+        (usize::from(u16::from_le_bytes(*length)), rest)
+    } else {
+        let (length, rest) = rest.split_first_chunk()?;
+        (usize::try_from(u32::from_le_bytes(*length)).ok()?, rest)
+    };
+    let (header, data) = rest.split_at_checked(length)?;
+    Some((std::str::from_utf8(header).ok()?, data))
+}
+
+fn numbers<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+    let (numbers, _) = data.as_chunks::<N>();
+    numbers.iter().map(|&bytes| number(bytes)).collect()
 }
 
 /// Writes hits.
@@ -212,28 +242,45 @@ fn write_csv(mut file: impl Write, hits: &Hits) -> anyhow::Result<()> {
     Ok(file.flush()?)
 }
 
-fn write_npy(file: impl Write, hits: &Hits) -> anyhow::Result<()> {
+fn write_npy(mut file: impl Write, hits: &Hits) -> anyhow::Result<()> {
     let rows = match hits {
         Hits::Any(hits) => hits.len(),
         Hits::Closest(hits) => hits.len(),
     };
-    let shape = [rows as u64, hits.columns().len() as u64];
-    let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
-    let mut writer = options.writer(file).begin_nd()?;
+    let columns = hits.columns().len();
+    let header =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    // Numbers begin at a multiple of 64: 10 bytes are before the header, and a line ends it.
+    let width = (header.len() + 11).next_multiple_of(64) - 11;
+    let header = format!("{header:<width$}\n");
+    file.write_all(NPY_MAGIC)?;
+    file.write_all(&[1, 0])?;
+    file.write_all(&u16::try_from(header.len())?.to_le_bytes())?;
+    file.write_all(header.as_bytes())?;
+    let mut write = |value: f64| file.write_all(&value.to_le_bytes());
     match hits {
         Hits::Any(hits) => {
-            writer.extend(hits.iter().map(|hit| f64::from(u8::from(*hit))))?;
-        }
-        Hits::Closest(hits) => writer.extend(hits.iter().flat_map(|hit| match hit {
-            Some(hit) => {
-                let ids = [hit.geometry_id, hit.primitive_id].map(f64::from);
-                let [t, u, v] = [hit.t, hit.u, hit.v].map(f64::from);
-                [t, u, v, ids[0], ids[1]]
+            for hit in hits {
+                write(f64::from(u8::from(*hit)))?;
             }
-            None => [f64::INFINITY, 0.0, 0.0, -1.0, -1.0],
-        }))?,
+        }
+        Hits::Closest(hits) => {
+            for hit in hits {
+                let row = match hit {
+                    Some(hit) => {
+                        let [t, u, v] = [hit.t, hit.u, hit.v].map(f64::from);
+                        let ids = [hit.geometry_id, hit.primitive_id].map(f64::from);
+                        [t, u, v, ids[0], ids[1]]
+                    }
+                    None => [f64::INFINITY, 0.0, 0.0, -1.0, -1.0],
+                };
+                for value in row {
+                    write(value)?;
+                }
+            }
+        }
     }
-    Ok(writer.finish()?)
+    Ok(file.flush()?)
 }
 
 #[cfg(test)]
@@ -272,6 +319,13 @@ mod tests {
         }
     }
 
+    fn array(kind: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let header =
+            format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': ({shape}), }}\n");
+        let length = (header.len() as u16).to_le_bytes();
+        [NPY_MAGIC, &[1, 0], &length, header.as_bytes(), data].concat()
+    }
+
     #[test]
     fn arrays_in_either_order_and_both_precisions() {
         let values = [0.0, 1.0, 2.0, 0.0, -1.0, 0.5, 3.0, 4.0, 5.0, 1.0, 0.1, 0.0];
@@ -279,68 +333,46 @@ mod tests {
             Ray::new([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]),
             Ray::new([3.0, 4.0, 5.0], [1.0, 0.1, 0.0]),
         ];
-        for order in [Order::C, Order::Fortran] {
-            let in_order = |place: usize| match order {
-                Order::C => values[place],
-                Order::Fortran => values[place % 2 * 6 + place / 2],
-            };
-            let options = || {
-                npyz::WriteOptions::new()
-                    .default_dtype()
-                    .shape(&[2, 6])
-                    .order(order)
-            };
-            let mut double = Vec::new();
-            let mut writer = options().writer(&mut double).begin_nd().unwrap();
-            writer.extend((0..12).map(in_order)).unwrap();
-            writer.finish().unwrap();
-            let mut single = Vec::new();
-            let options = npyz::WriteOptions::new()
-                .default_dtype()
-                .shape(&[2, 6])
-                .order(order);
-            let mut writer = options.writer(&mut single).begin_nd().unwrap();
-            writer
-                .extend((0..12).map(|place| in_order(place) as f32))
-                .unwrap();
-            writer.finish().unwrap();
-            let read = |bytes: &[u8]| {
+        for order in ["False", "True"] {
+            let in_order = (0..12).map(|place| match order {
+                "False" => values[place],
+                _ => values[place % 2 * 6 + place / 2],
+            });
+            let in_order: Vec<f64> = in_order.collect();
+            let double: Vec<u8> = in_order.iter().flat_map(|x| x.to_le_bytes()).collect();
+            let single = in_order.iter().flat_map(|&x| (x as f32).to_be_bytes());
+            let single: Vec<u8> = single.collect();
+            let read = |kind: &str, data: &[u8]| {
                 let mut rounded = 0;
-                (npy_rows(bytes).unwrap().rays(&mut rounded), rounded)
+                let bytes = array(kind, order, "2, 6", data);
+                (npy_rows(&bytes[..]).unwrap().rays(&mut rounded), rounded)
             };
             // 0.1 is no binary fraction.
-            assert_eq!(read(&double), (expected.to_vec(), 1));
-            assert_eq!(read(&single), (expected.to_vec(), 0));
+            assert_eq!(read("<f8", &double), (expected.to_vec(), 1));
+            assert_eq!(read(">f4", &single), (expected.to_vec(), 0));
         }
     }
 
     #[test]
     fn other_arrays_are_errors() {
-        let bytes = |shape: &[u64]| {
-            let mut bytes = Vec::new();
-            let options = npyz::WriteOptions::new().default_dtype().shape(shape);
-            let mut writer = options.writer(&mut bytes).begin_nd().unwrap();
-            writer
-                .extend((0..shape.iter().product()).map(|n| n as i64))
-                .unwrap();
-            writer.finish().unwrap();
-            bytes
-        };
-        for (shape, said) in [
-            (&[12][..], "dimensions"),
-            (&[2, 5], "rows of 5"),
-            (&[2, 6], "i8"),
+        for (kind, shape, said) in [
+            ("<f8", "12,", "dimensions"),
+            ("<f8", "2, 5", "rows of 5"),
+            ("<i8", "2, 6", "i8"),
+            ("<f8", "3, 6", "12 numbers"),
         ] {
-            let error = npy_rows(&bytes(shape)[..]).err().map(|e| format!("{e:#}"));
+            let bytes = array(kind, "False", shape, &[0; 96]);
+            let error = npy_rows(&bytes[..]).err().map(|e| format!("{e:#}"));
             assert!(
                 error.as_ref().is_some_and(|e| e.contains(said)),
                 "{error:?}"
             );
         }
         assert!(npy_rows(&b"no array"[..]).is_err());
-        // Cut off.
-        let whole = bytes(&[2, 6]);
-        assert!(npy_rows(&whole[..whole.len() - 1]).is_err());
+        let whole = array("<f8", "False", "2, 6", &[0; 96]);
+        for cut in 0..whole.len() {
+            assert!(npy_rows(&whole[..cut]).is_err(), "{cut}");
+        }
     }
 
     #[test]
@@ -359,12 +391,14 @@ mod tests {
         assert_eq!(lines.next(), Some("t,u,v,geometry_id,primitive_id"));
         assert_eq!(lines.next(), Some("inf,0,0,-1,-1"));
         let fields: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let numbers: Vec<f32> = fields[..3].iter().map(|f| f.parse().unwrap()).collect();
-        assert_eq!(numbers, [hit.t, hit.u, hit.v]);
+        let written: Vec<f32> = fields[..3].iter().map(|f| f.parse().unwrap()).collect();
+        assert_eq!(written, [hit.t, hit.u, hit.v]);
         assert_eq!(fields[3..], ["7", "4294967294"]);
         let mut bytes = Vec::new();
         write_npy(&mut bytes, &hits).unwrap();
-        let values: Vec<f64> = NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
+        let (header, data) = npy_parts(&bytes).unwrap();
+        assert!(header.contains("(2, 5)") && (bytes.len() - data.len()).is_multiple_of(64));
+        let values = numbers(data, f64::from_le_bytes);
         let expected = [hit.t, hit.u, hit.v].map(f64::from);
         assert_eq!(values[..5], [f64::INFINITY, 0.0, 0.0, -1.0, -1.0]);
         assert_eq!(values[5..8], expected);
