@@ -109,13 +109,14 @@ fn gains_have_a_row_for_each_run_and_goals() {
     for row in &rows[1..] {
         assert_eq!(row[0], "interior");
         let tried: usize = row[4].parse().unwrap();
-        assert!((1..=3).contains(&tried));
+        // What the first frames took decides whether there is time for trials.
+        assert!(tried <= 3);
         assert!(
             row[6..9]
                 .iter()
                 .all(|ratio| ratio.parse::<f64>().unwrap() > 0.0)
         );
         let is_eleven = row[2] == "eleven";
-        assert!(!is_eleven || !row[11].contains("optimized"), "{row:?}");
+        assert!(!is_eleven || !row[12].contains("optimized"), "{row:?}");
     }
 }

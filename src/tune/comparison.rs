@@ -1,8 +1,8 @@
 //! Tuned parameters beside fixed baselines, measured in turns.
 //!
-//! Every round builds and renders each row once, beginning with another row each time, and every other round
-//! in reverse, so that a drift of the machine and what a row leaves in caches and memory fall on all alike. All rows render the same samples. A figure is a ratio
-//! within a round.
+//! Every round builds and renders each row once, beginning with another row each time, and every other round in
+//! reverse, so that after six rounds a drift of the machine and what a row leaves in caches and memory have
+//! fallen on all alike. All rows render the same samples. A figure is a ratio within a round.
 
 use std::time::Duration;
 

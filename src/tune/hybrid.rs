@@ -19,15 +19,17 @@
 //! and number of frames alone. A candidate that cannot be built or is hopeless costs its build and 1/32 of
 //! the tiles. Nothing here reads a clock but the stage's.
 
+mod background;
 mod budget;
 mod change;
 mod frame;
+mod incumbent;
 mod report;
 mod trial;
 
-use std::{collections::HashMap, fmt, time::Duration};
+use std::{collections::HashMap, fmt, thread::Scope, time::Duration};
 
-use raywright_bvh::{BuildParams, Bvh};
+use raywright_bvh::BuildParams;
 use raywright_imaging::{Camera, CancelToken, Film};
 use raywright_tracer::World;
 use raywright_tuner::{ChangeDetector, Config, Outcome, Reason, Search, Trial, Tuner};
@@ -38,8 +40,10 @@ use super::{
     space::ParameterSpace,
     stage::{Clock, SessionError, Settings, Stage, add_frame},
 };
+use background::{Background, Built};
 use budget::Budget;
 use frame::Frame;
+use incumbent::Incumbent;
 pub use report::{Candidate, HybridFrame, Probed};
 
 /// Gain that is not worth a trial, as a share of the cost; and proposals in a row that promise less.
@@ -60,25 +64,6 @@ const FRESH: f64 = 0.2;
 
 /// Standard deviation of the logarithm of the time of a frame that is taken for noise at least.
 const LEAST_NOISE: f64 = 0.01;
-
-/// The tree that frames are rendered with.
-#[derive(Debug)]
-struct Incumbent {
-    config: Config,
-    params: BuildParams,
-    tree: Bvh,
-    /// Seconds of each of its builds.
-    builds: Vec<f64>,
-    /// The logarithm of its cost over that of the first incumbent; and by what is sure of each step.
-    log_cost: f64,
-    sure_log_cost: f64,
-}
-
-impl Incumbent {
-    fn build(&self) -> f64 {
-        self.builds.iter().sum::<f64>() / self.builds.len() as f64
-    }
-}
 
 /// Makes searches that have not begun.
 struct MakeSearch(Box<dyn Fn() -> Box<dyn Search> + Send + Sync>);
@@ -125,10 +110,18 @@ pub struct Hybrid<'a, C> {
     begun: u64,
     /// What trials may take.
     budget: Budget,
-    /// That of the first incumbent of this search: `Incumbent::sure_log_cost`.
-    first_sure_log_cost: f64,
     /// A trial that waits for time.
     waiting: Option<Trial>,
+    /// Where candidates are built if frames are not to wait for it.
+    background: Option<Background<'a>>,
+}
+
+/// What is done for a trial in a frame.
+enum Step {
+    /// It is tried: with a tree that is ready, or one that is to be built.
+    Try(Trial, Option<Built>),
+    /// Its tree is begun beside the frame.
+    Begin(Trial, BuildParams),
 }
 
 impl<'a, C: Clock> Hybrid<'a, C> {
@@ -173,8 +166,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             check: None,
             begun: 0,
             budget: Budget::new(DEFAULT_OVERHEAD),
-            first_sure_log_cost: 0.0,
             waiting: None,
+            background: None,
         })
     }
 
@@ -191,6 +184,31 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     #[must_use]
     pub fn with_overhead_limit(mut self, share: f64) -> Self {
         self.budget.share = share;
+        self
+    }
+
+    /// The same run, in which no frame waits for the tree of a candidate: a thread of `scope` builds it beside the
+    /// frames of the incumbent and yields to them, and the time that is told of such a build is that which the thread worked. Only
+    /// where trees serve any number of frames ([`Metric::Render`](super::Metric::Render)): nothing is built in the
+    /// background where frames bear a share of their build.
+    ///
+    /// ```
+    /// use raywright::tune::{Hybrid, Clock, SessionError};
+    /// # use raywright::imaging::CancelToken;
+    /// fn frames<C: Clock + Clone + Send>(run: Hybrid<'_, C>) -> Result<(), SessionError> {
+    ///     std::thread::scope(|scope| {
+    ///         let mut run = run.with_background_builds(scope);
+    ///         run.frame(&CancelToken::new()).map(|_| ())
+    ///     })
+    /// }
+    /// ```
+    #[must_use]
+    pub fn with_background_builds<'env: 'a>(mut self, scope: &'a Scope<'a, 'env>) -> Self
+    where
+        C: Clone + Send + 'a,
+    {
+        let is_free = self.stage.settings.metric.build_share() == 0.0;
+        self.background = is_free.then(|| Background::new(scope, self.stage.clock()));
         self
     }
 
@@ -236,35 +254,50 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let usual = self.render_time();
         let built = self.rebuild(&mut incumbent);
         let rebuild = built.as_ref().map_or(0.0, Duration::as_secs_f64);
-        let trial = built.and_then(|build| Ok((build, self.next_trial(&incumbent)?)));
-        let tried = trial.and_then(|(build, trial)| match trial {
-            Some(trial) => {
-                start += self.time_of(|| begins(&trial));
-                let tried = self.try_candidate(&mut frame, &mut incumbent, &trial)?;
-                Ok(tried.map(|(candidate, own)| (Some(candidate), build + own)))
-            }
-            None => {
+        let step = built.and_then(|build| Ok((build, self.next_step(&incumbent)?)));
+        let is_beside = self.is_building() || matches!(step, Ok((_, Some(Step::Begin(..)))));
+        let tried = step.and_then(|(build, step)| {
+            let (trial, ready) = match step {
+                Some(Step::Try(trial, None)) => {
+                    start += self.time_of(|| begins(&trial));
+                    (Some(trial), None)
+                }
+                Some(Step::Try(trial, ready)) => (Some(trial), ready),
+                Some(Step::Begin(trial, params)) => {
+                    start += self.time_of(|| begins(&trial));
+                    self.begin_beside(trial, params);
+                    (None, None)
+                }
+                None => (None, None),
+            };
+            let Some(trial) = trial else {
                 self.trace_rest(&mut frame, &incumbent.tree)?;
-                Ok(frame.is_done().then_some((None, build)))
-            }
+                return Ok(frame.is_done().then_some((None, build)));
+            };
+            let tried = self.try_candidate(&mut frame, &mut incumbent, &trial, ready)?;
+            Ok(tried.map(|(candidate, own)| (Some(candidate), build + own)))
         });
         let params = incumbent.params;
         self.incumbent = Some(incumbent);
         let Some((candidate, build)) = tried? else {
             return Ok(None);
         };
-        if candidate.is_none() {
-            let render = (self.stage.now() - start).saturating_sub(build);
-            self.learn_sharing(render, &frame.times, FRESH);
+        // Frames beside which something is built tell nothing of the others.
+        if !is_beside {
+            if candidate.is_none() {
+                let render = (self.stage.now() - start).saturating_sub(build);
+                self.learn_sharing(render, &frame.times, FRESH);
+            }
+            self.watch(&frame.times);
         }
-        self.watch(&frame.times);
         add_frame(&mut self.film, &frame.film);
         self.spare = Some(frame.film);
         self.finished += 1;
         let time = self.stage.now() - start;
-        let lost = match candidate {
-            Some(_) => (time.as_secs_f64() - rebuild - usual).max(0.0),
-            None => 0.0,
+        let lost = if candidate.is_some() || is_beside {
+            (time.as_secs_f64() - rebuild - usual).max(0.0)
+        } else {
+            0.0
         };
         let saved = self.saved_by_frame();
         self.budget.add_frame(time.as_secs_f64(), lost, saved);
@@ -302,14 +335,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         let render = (self.stage.now() - start).saturating_sub(build);
         self.learn_sharing(render, &frame.times, 1.0);
-        let incumbent = Incumbent {
-            config: trial.canonical.clone(),
-            params: self.first,
-            tree,
-            builds: vec![build.as_secs_f64()],
-            log_cost: 0.0,
-            sure_log_cost: 0.0,
-        };
+        let config = trial.canonical.clone();
+        let incumbent = Incumbent::first(config, self.first, tree, build.as_secs_f64());
         self.incumbent = Some(incumbent);
         self.unit = self.incumbent_cost().unwrap_or(0.0);
         self.tell(&trial, Outcome::Done { cost: self.unit })?;
@@ -378,39 +405,69 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         let built = self.stage.build(&incumbent.params);
         let (tree, time) = built.map_err(SessionError::Build)?;
-        let old = std::mem::replace(&mut incumbent.tree, tree);
-        self.stage.recycle(old);
-        incumbent.builds.push(time.as_secs_f64());
+        self.stage
+            .recycle(incumbent.rebuilt(tree, time.as_secs_f64()));
         Ok(time)
     }
 
-    /// What is tried in the next frame: what is wished, unless it is too dear yet.
-    fn next_trial(&mut self, incumbent: &Incumbent) -> Result<Option<Trial>, SessionError> {
+    /// What is done for trials in the next frame: what is wished, unless it is too dear yet.
+    fn next_step(&mut self, incumbent: &Incumbent) -> Result<Option<Step>, SessionError> {
         if self.is_frozen {
             return Ok(None);
         }
-        let mut waiting = self.waiting.take();
-        // A check goes first, and is taken for nothing else.
-        if self.check.is_some()
-            && let Some(trial) = waiting.take()
-        {
-            self.tell(&trial, Outcome::Cancelled)?;
+        // A check goes first, and what is built or waits is taken for nothing else.
+        if let Some((config, _)) = &self.check {
+            let canonical = self.space.space().canonical(config);
+            let building = self.background.as_mut();
+            let other = building.filter(|own| {
+                own.trial()
+                    .is_some_and(|trial| trial.canonical != canonical)
+            });
+            let given_up = other.and_then(Background::give_up);
+            for trial in given_up.into_iter().chain(self.waiting.take()) {
+                self.tell(&trial, Outcome::Cancelled)?;
+            }
         }
-        let trial = match waiting {
+        if let Some(background) = self.background.as_mut().filter(|own| own.is_building()) {
+            let finished = background.finished();
+            return Ok(finished.map(|(trial, built)| Step::Try(trial, Some(built))));
+        }
+        let trial = match self.waiting.take() {
             Some(trial) => trial,
             None => match self.wished_trial(incumbent)? {
                 Some(trial) => trial,
                 None => return Ok(None),
             },
         };
-        let quality = self.space.params(&trial.config).quality;
+        let params = self.space.params(&trial.config);
         let (own, build) = (incumbent.params.quality, incumbent.build());
-        let expected = self.budget.expected_build(quality, own, build);
-        if self.budget.allows(expected, trial.reason == Reason::Start) {
-            return Ok(Some(trial));
+        let expected = self.budget.expected_build(params.quality, own, build);
+        if !self.budget.allows(expected, trial.reason == Reason::Start) {
+            self.waiting = Some(trial);
+            return Ok(None);
         }
-        self.waiting = Some(trial);
-        Ok(None)
+        // The incumbent beside itself needs no tree.
+        let is_own = trial.canonical == incumbent.config;
+        Ok(Some(if self.background.is_some() && !is_own {
+            Step::Begin(trial, params)
+        } else {
+            Step::Try(trial, None)
+        }))
+    }
+
+    /// Whether a tree is being built beside the frames.
+    fn is_building(&self) -> bool {
+        self.background
+            .as_ref()
+            .is_some_and(Background::is_building)
+    }
+
+    /// Begins the tree of a trial beside the frames.
+    fn begin_beside(&mut self, trial: Trial, params: BuildParams) {
+        let world = self.stage.world();
+        if let Some(background) = &mut self.background {
+            background.begin(world, params, trial);
+        }
     }
 
     /// What would be tried next if it cost nothing.
@@ -445,7 +502,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let best = self.tuner.incumbent()?;
         let probes = self.probed.get(&best.canonical).map_or(0, |known| known.1);
         let is_rival = best.canonical != incumbent.config && probes < MOST_PROBES;
-        (is_rival && best.cost < self.unit * incumbent.log_cost.exp()).then(|| best.config.clone())
+        (is_rival && best.cost < self.unit * incumbent.log_cost().exp())
+            .then(|| best.config.clone())
     }
 
     /// Tells the tuner an outcome.
@@ -494,12 +552,11 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         Some(metric.cost(incumbent.build(), self.render_time()))
     }
 
-    /// Seconds by which a frame surely costs less than with the first incumbent of this search: what was accepted
-    /// seems better than it is, since others were not.
+    /// Seconds by which a frame surely costs less than with the first incumbent of this search.
     fn saved_by_frame(&self) -> f64 {
-        let log_cost = self.incumbent.as_ref().map_or(0.0, |own| own.sure_log_cost);
-        let cost = self.incumbent_cost().unwrap_or(0.0);
-        cost * (self.first_sure_log_cost - log_cost).exp_m1()
+        let incumbent = self.incumbent.as_ref();
+        let log_cost = incumbent.map_or(0.0, Incumbent::sure_log_cost);
+        self.incumbent_cost().unwrap_or(0.0) * (-log_cost).exp_m1()
     }
 
     /// Seconds that a frame is expected to take to render with the incumbent.

@@ -241,6 +241,41 @@ impl Costs {
     }
 }
 
+/// What the parts of one probe have told.
+#[derive(Debug, Default)]
+pub(super) struct Evidence {
+    pairs: Vec<Pair>,
+    parts: usize,
+}
+
+impl Evidence {
+    /// Adds the pairs of a part: the ratio in this frame, that together with what was known `before`, and what
+    /// is decided; `None` if nothing can be said.
+    ///
+    /// A tree that was built just now lies in the caches, and the other does not: the first part says whether
+    /// the candidate is hopeless, and no more.
+    pub(super) fn add_part(
+        &mut self,
+        part: impl IntoIterator<Item = Pair>,
+        costs: &Costs,
+        before: Option<ProbeRatio>,
+    ) -> Option<(ProbeRatio, ProbeRatio, Decision)> {
+        let is_first = self.parts == 0;
+        if self.parts == 1 {
+            self.pairs.clear();
+        }
+        self.parts += 1;
+        self.pairs.extend(part);
+        let ratio = ProbeRatio::of(&self.pairs)?;
+        let all = before.map_or(ratio, |before| before.and(ratio));
+        let decision = match costs.decide(all) {
+            Decision::Accepted if is_first => Decision::Undecided,
+            decision => decision,
+        };
+        Some((ratio, all, decision))
+    }
+}
+
 /// Tiles in an order in which each beginning is spread over the picture: multiples of the golden section.
 pub(super) fn spread_order(tiles: usize, frame: u32) -> Vec<usize> {
     let gcd = |mut a: usize, mut b: usize| {
@@ -349,6 +384,30 @@ mod tests {
         };
         assert_eq!(decide(with_build, 0.9), Decision::Rejected);
         assert!((with_build.ratio(0.6) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_first_part_of_a_probe_rejects_and_accepts_nothing() {
+        let costs = Costs {
+            render: 1.0,
+            incumbent_build: 0.0,
+            candidate_build: 0.0,
+        };
+        let decided = |parts: &[f64], before: Option<ProbeRatio>| {
+            let mut evidence = Evidence::default();
+            let decisions = parts.iter().map(|&ratio| {
+                let part = evidence.add_part(pairs(60, ratio, 1.0, 0.02), &costs, before);
+                part.unwrap().2
+            });
+            decisions.collect::<Vec<_>>()
+        };
+        use Decision::{Accepted, Rejected, Undecided};
+        assert_eq!(decided(&[0.93, 1.0, 1.0], None), [Undecided; 3]);
+        assert_eq!(decided(&[0.93, 0.93], None), [Undecided, Accepted]);
+        assert_eq!(decided(&[1.3], None), [Rejected]);
+        // Nor together with an earlier probe.
+        let before = ProbeRatio::of(&pairs(60, 0.93, 1.0, 0.02));
+        assert_eq!(decided(&[0.93, 0.93], before), [Undecided, Accepted]);
     }
 
     #[test]

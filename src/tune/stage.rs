@@ -177,11 +177,26 @@ impl<'a, C: Clock> Stage<'a, C> {
         let start = self.clock.now();
         let tree = self.world.build_tree(params, &mut self.workspace)?;
         let time = self.clock.now() - start;
-        let tree = tree.with_isa(self.settings.isa);
-        Ok((
-            tree.expect("the session was made for an instruction set of this machine"),
-            time,
-        ))
+        Ok((self.on_isa(tree), time))
+    }
+
+    /// A tree that is traced by the run's instruction set.
+    pub(super) fn on_isa(&self, tree: Bvh) -> Bvh {
+        tree.with_isa(self.settings.isa)
+            .expect("the session was made for an instruction set of this machine")
+    }
+
+    /// What is shown.
+    pub(super) fn world(&self) -> &'a World {
+        self.world
+    }
+
+    /// The clock.
+    pub(super) fn clock(&self) -> C
+    where
+        C: Clone,
+    {
+        self.clock.clone()
     }
 
     /// Leaves the memory of a tree to the next.

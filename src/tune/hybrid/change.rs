@@ -43,21 +43,21 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let others = records
             .filter(|record| record.canonical != incumbent.config && record.cost.is_finite());
         let best = others.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-        let log = (best.cost / self.unit).ln() - incumbent.log_cost;
+        let log = (best.cost / self.unit).ln() - incumbent.log_cost();
         Some((best.config.clone(), log))
     }
 
     /// After a probe of what is known: the search begins again if its cost over that of the incumbent is not
     /// what it was.
-    pub(super) fn checked(&mut self, incumbent: &Incumbent, probed: &Probed, known: f64) {
-        let now = (probed.cost / self.unit).ln() - incumbent.log_cost;
+    pub(super) fn checked(&mut self, incumbent: &mut Incumbent, probed: &Probed, known: f64) {
+        let now = (probed.cost / self.unit).ln() - incumbent.log_cost();
         if (now - known).abs() > SAME.max(2.0 * probed.ratio.deviation) {
             self.begin_again(incumbent);
         }
     }
 
     /// Searches once more, beginning with what was best.
-    pub(super) fn begin_again(&mut self, incumbent: &Incumbent) {
+    pub(super) fn begin_again(&mut self, incumbent: &mut Incumbent) {
         let mut records: Vec<_> = self.tuner.records().to_vec();
         records.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let best = records.into_iter().filter(|record| !record.has_failed());
@@ -67,7 +67,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.begun += 1;
         let seed = self.stage.settings.seed.wrapping_add(self.begun);
         self.tuner = Tuner::new(self.space.space().clone(), (self.search.0)(), seed);
-        let cost = self.unit * incumbent.log_cost.exp();
+        let cost = self.unit * incumbent.log_cost().exp();
         let config = self.space.config(&incumbent.params);
         if let Ok(config) = config {
             // A cost that was told before can be told again.
@@ -79,7 +79,10 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.probed.clear();
         (self.quiet, self.fruitless) = (0, 0);
         self.waiting = None;
-        self.first_sure_log_cost = incumbent.sure_log_cost;
+        if let Some(background) = &mut self.background {
+            background.give_up();
+        }
+        incumbent.begin_again();
         self.budget.begin(cost);
         self.is_searching = true;
     }
@@ -97,9 +100,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             let built = self.stage.build(&incumbent.params);
             let (tree, time) = built.map_err(SessionError::Build)?;
             self.stage
-                .recycle(std::mem::replace(&mut incumbent.tree, tree));
-            incumbent.builds = vec![time.as_secs_f64()];
-            self.begin_again(&incumbent);
+                .recycle(incumbent.moved(tree, time.as_secs_f64()));
+            self.begin_again(&mut incumbent);
             self.detector = ChangeDetector::new(LEAST_NOISE);
             self.incumbent = Some(incumbent);
         }

@@ -1,8 +1,11 @@
 //! Frames of a hybrid run: their picture, their trials, their end.
 
 use std::{
-    sync::atomic::{AtomicU64, Ordering},
-    time::Duration,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
 };
 
 use raywright_bvh::{BuildParams, Quality};
@@ -14,7 +17,14 @@ use super::*;
 use crate::tune::{Decision, Metric, SpaceAxes, TrialFailure, WallClock, portfolio};
 
 /// Goes on by another step each time that it is looked at; with 0 it stands still.
-struct OddClock(AtomicU64, u64);
+#[derive(Clone)]
+struct OddClock(Arc<AtomicU64>, u64);
+
+impl OddClock {
+    fn new(step: u64) -> Self {
+        Self(Arc::new(AtomicU64::new(1)), step)
+    }
+}
 
 impl Clock for OddClock {
     fn now(&self) -> Duration {
@@ -78,6 +88,14 @@ fn hybrid<'p, C: Clock>(
 /// The same frames by one tree.
 fn plain(place: &Place, frames: u32) -> Film {
     let settings = settings(Metric::Render);
+    let mut film = Film::new(settings.width, settings.height).unwrap();
+    add_plain(place, &mut film, 0..frames);
+    film
+}
+
+/// Adds frames by one tree.
+fn add_plain(place: &Place, film: &mut Film, frames: std::ops::Range<u32>) {
+    let settings = settings(Metric::Render);
     let shot = Shot {
         world: &place.world,
         camera: place.camera,
@@ -90,12 +108,10 @@ fn plain(place: &Place, frames: u32) -> Film {
         .world
         .build_tree(&BuildParams::default(), &mut Default::default())
         .unwrap();
-    let mut film = Film::new(settings.width, settings.height).unwrap();
-    for sample in 0..frames {
-        let done = shot.render(&mut film, sample..sample + 1, &TileLoop::new(), |_| &tree);
+    for sample in frames {
+        let done = shot.render(film, sample..sample + 1, &TileLoop::new(), |_| &tree);
         assert_eq!(done, Ok(raywright_imaging::Completion::Finished));
     }
-    film
 }
 
 #[test]
@@ -108,7 +124,7 @@ fn whatever_is_tried_the_picture_is_that_of_one_tree() {
         Metric::of_frames_per_tree(7.try_into().unwrap()),
     ] {
         for step in [0, 1, 3] {
-            let clock = OddClock(AtomicU64::new(1), step);
+            let clock = OddClock::new(step);
             let mut run = hybrid(&place, metric, &BuildParams::default(), clock);
             let mut tried = 0;
             for _ in 0..30 {
@@ -152,7 +168,7 @@ fn a_bad_tree_is_left_at_once_and_a_good_one_kept() {
 #[test]
 fn trying_comes_to_an_end_and_begins_again_with_another_scene() {
     let [first, second] = ["interior", "voxel-terrain"].map(place);
-    let clock = OddClock(AtomicU64::new(1), 2);
+    let clock = OddClock::new(2);
     let mut run = hybrid(&first, Metric::Render, &BuildParams::default(), clock);
     let frames = (0..400).take_while(|_| {
         run.frame(&CancelToken::new()).unwrap();
@@ -196,7 +212,7 @@ fn what_cannot_be_built_costs_nothing_but_its_build() {
 #[test]
 fn a_cancelled_frame_is_as_if_never_begun() {
     let place = place("interior");
-    let clock = OddClock(AtomicU64::new(1), 1);
+    let clock = OddClock::new(1);
     let mut run = hybrid(&place, Metric::Total, &BuildParams::default(), clock);
     for frame in 0..6 {
         let cancelled = CancelToken::new();
@@ -215,12 +231,7 @@ fn what_is_known_is_scaled_to_the_machine_and_not_tried_before_it_is_better() {
     let mut other = base;
     other.branching_factor = 4;
     for (cost, is_tried) in [(50.0, true), (200.0, false)] {
-        let run = hybrid(
-            &place,
-            Metric::Render,
-            &base,
-            OddClock(AtomicU64::new(1), 1),
-        );
+        let run = hybrid(&place, Metric::Render, &base, OddClock::new(1));
         let configs = [base, other].map(|params| run.space().config(&params).unwrap());
         let known = configs.into_iter().zip([100.0, cost]);
         let mut run = run
@@ -237,7 +248,7 @@ fn what_is_known_is_scaled_to_the_machine_and_not_tried_before_it_is_better() {
 fn trials_wait_until_there_is_time_for_them() {
     let place = place("interior");
     let tried = |limit: f64| -> usize {
-        let clock = OddClock(AtomicU64::new(1), 1);
+        let clock = OddClock::new(1);
         let run = hybrid(&place, Metric::Render, &BuildParams::default(), clock);
         let mut run = run.with_overhead_limit(limit);
         let frames = (0..20).map(|_| run.frame(&CancelToken::new()).unwrap().unwrap());
@@ -249,4 +260,102 @@ fn trials_wait_until_there_is_time_for_them() {
     assert_eq!(tried(0.0), 0);
     let some = tried(0.001);
     assert!((1..freely).contains(&some), "{some} of {freely}");
+}
+
+#[test]
+fn built_beside_the_frames_trials_change_no_picture_and_no_frame_waits() {
+    let place = place("interior");
+    std::thread::scope(|scope| {
+        let run = hybrid(
+            &place,
+            Metric::Render,
+            &BuildParams::default(),
+            OddClock::new(1),
+        );
+        let mut run = run.with_background_builds(scope);
+        let (mut tried, mut begun, mut frames) = (0, 0, 0);
+        while tried < 5 {
+            let frame = run.frame_told(&CancelToken::new(), |_| begun += 1);
+            let frame = frame.unwrap().unwrap();
+            assert_eq!(frame.build > Duration::ZERO, frames == 0);
+            tried += usize::from(frame.candidate.is_some());
+            frames += 1;
+            assert!(frames < 1000);
+        }
+        // The first parameters are a trial too, and need no tree of their own.
+        assert!(begun > tried, "{begun}");
+        assert!(run.film().mean() == plain(&place, frames).mean());
+    });
+}
+
+#[test]
+fn what_is_built_for_another_scene_is_given_up() {
+    let [first, second] = ["interior", "voxel-terrain"].map(place);
+    std::thread::scope(|scope| {
+        let run = hybrid(
+            &first,
+            Metric::Render,
+            &BuildParams::default(),
+            OddClock::new(1),
+        );
+        let mut run = run.with_background_builds(scope);
+        for _ in 0..2 {
+            run.frame(&CancelToken::new()).unwrap().unwrap();
+        }
+        assert!(run.is_building());
+        run.change_scene(&second.world, second.camera).unwrap();
+        assert!(!run.is_building());
+        let mut expected = plain(&first, 2);
+        add_plain(&second, &mut expected, 2..20);
+        for _ in 2..20 {
+            run.frame(&CancelToken::new()).unwrap().unwrap();
+        }
+        assert!(run.film().mean() == expected.mean());
+    });
+}
+
+#[test]
+fn a_run_that_ends_does_not_wait_for_its_build() {
+    let place = Place {
+        camera: generate::voxel_terrain(24).camera.unwrap(),
+        world: World::new(generate::voxel_terrain(400)),
+    };
+    let mut slow = BuildParams::default();
+    slow.quality = Quality::Optimized;
+    let begun = Instant::now();
+    let tree = place.world.build_tree(&slow, &mut Default::default());
+    tree.unwrap();
+    let build = begun.elapsed();
+    let ended = std::thread::scope(|scope| {
+        let run = hybrid(
+            &place,
+            Metric::Render,
+            &BuildParams::default(),
+            WallClock::start(),
+        );
+        let mut run = run.with_starts(&[slow]).with_background_builds(scope);
+        for _ in 0..2 {
+            run.frame(&CancelToken::new()).unwrap().unwrap();
+        }
+        assert!(run.is_building());
+        Instant::now()
+    });
+    assert!(ended.elapsed() < build / 2, "{:?}", ended.elapsed());
+}
+
+#[test]
+fn where_frames_bear_their_builds_none_is_in_the_background() {
+    let place = place("interior");
+    std::thread::scope(|scope| {
+        let run = hybrid(
+            &place,
+            Metric::Total,
+            &BuildParams::default(),
+            OddClock::new(1),
+        );
+        let mut run = run.with_background_builds(scope);
+        run.frame(&CancelToken::new()).unwrap().unwrap();
+        let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+        assert!(frame.candidate.is_some() && frame.build > Duration::ZERO);
+    });
 }

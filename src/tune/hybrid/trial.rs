@@ -8,9 +8,9 @@ use std::time::Duration;
 use raywright_bvh::{BuildParams, Bvh};
 use raywright_tuner::{ChangeDetector, Outcome, Reason, Trial};
 
-use super::{Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, frame::Frame};
+use super::{Built, Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, frame::Frame};
 use crate::tune::{
-    probe::{Costs, Decision, Pair, ProbeRatio, SHARES, spread_order},
+    probe::{Costs, Decision, Evidence, Pair, ProbeRatio, SHARES, spread_order},
     session::TrialFailure,
     stage::{Clock, FrameTimes, SessionError},
 };
@@ -39,21 +39,25 @@ fn times(build: f64, costs: &Costs, ratio: ProbeRatio) -> FrameTimes {
 }
 
 impl<C: Clock> Hybrid<'_, C> {
-    /// Tries what a trial says, and finishes the frame with the better tree; the candidate and the time of its
-    /// build. `None` if the frame was cancelled.
+    /// Tries what a trial says, with a tree that is `ready` or is built now, and finishes the frame with the better
+    /// one; the candidate and the time for which the frame waited for it. `None` if the frame was cancelled.
     pub(super) fn try_candidate(
         &mut self,
         frame: &mut Frame<'_>,
         incumbent: &mut Incumbent,
         trial: &Trial,
+        ready: Option<Built>,
     ) -> Result<Option<(Candidate, Duration)>, SessionError> {
         let params = self.space.params(&trial.config);
         // The incumbent beside itself shows how much noise there is, and needs no tree.
         let is_own = trial.canonical == incumbent.config;
-        let built = if is_own {
-            Ok(None)
-        } else {
-            self.stage.build(&params).map(Some)
+        let is_ready = ready.is_some();
+        let built = match ready {
+            _ if is_own => Ok(None),
+            Some(built) => {
+                built.and_then(|(tree, build)| Ok(Some((self.stage.on_isa(tree), build))))
+            }
+            None => self.stage.build(&params).map(Some),
         };
         let (outcome, build) = match built {
             Err(error) => {
@@ -70,7 +74,7 @@ impl<C: Clock> Hybrid<'_, C> {
             }
             Ok(Some((tree, build))) => {
                 let outcome = self.beside(frame, incumbent, trial, params, tree, build)?;
-                (outcome, build)
+                (outcome, if is_ready { Duration::ZERO } else { build })
             }
         };
         let told = match &outcome {
@@ -126,7 +130,7 @@ impl<C: Clock> Hybrid<'_, C> {
     ) -> Probed {
         frame.times.extend(&probe.candidate_times);
         frame.times.extend(&probe.incumbent_times);
-        let cost = self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp());
+        let cost = self.unit * incumbent.log_cost().exp() * costs.ratio(probe.ratio.log.exp());
         Probed {
             times: times(incumbent.build(), costs, probe.ratio),
             ratio: probe.ratio,
@@ -148,9 +152,12 @@ impl<C: Clock> Hybrid<'_, C> {
         build: Duration,
     ) -> Result<Result<Probed, TrialFailure>, SessionError> {
         let costs = self.costs(incumbent, build.as_secs_f64());
-        let own = (incumbent.params.quality, incumbent.build());
-        self.budget
-            .add_build(params.quality, build.as_secs_f64(), own.0, own.1);
+        // Builds beside frames are timed by another measure.
+        if self.background.is_none() {
+            let own = (incumbent.params.quality, incumbent.build());
+            self.budget
+                .add_build(params.quality, build.as_secs_f64(), own.0, own.1);
+        }
         // What is to be seen by a check is whether what was known still holds.
         let is_check = self.check.is_some();
         let before = self.probed.get(&trial.canonical).copied();
@@ -173,7 +180,7 @@ impl<C: Clock> Hybrid<'_, C> {
             times: times(build.as_secs_f64(), &costs, probe.ratio),
             ratio: probe.ratio,
             cost_ratio: costs.bounds(probe.all),
-            cost: self.unit * incumbent.log_cost.exp() * costs.ratio(probe.ratio.log.exp()),
+            cost: self.unit * incumbent.log_cost().exp() * costs.ratio(probe.ratio.log.exp()),
             share: if is_accepted {
                 1.0 - other_share
             } else {
@@ -193,13 +200,10 @@ impl<C: Clock> Hybrid<'_, C> {
             for &(tile, time) in &frame.times {
                 self.tiles[tile] = time;
             }
-            let old = std::mem::replace(&mut incumbent.tree, tree);
+            let accepted = (trial.canonical.clone(), params, tree, build.as_secs_f64());
+            let build_share = self.stage.settings.metric.build_share();
+            let old = incumbent.replace(accepted, costs, probe.all, build_share);
             self.stage.recycle(old);
-            incumbent.config = trial.canonical.clone();
-            incumbent.params = params;
-            incumbent.builds = vec![build.as_secs_f64()];
-            incumbent.log_cost += costs.ratio(factor).ln();
-            incumbent.sure_log_cost += costs.bounds(probe.all)[2].ln().min(0.0);
             self.probed.clear();
             self.quiet = 0;
             self.detector = ChangeDetector::new(LEAST_NOISE);
@@ -228,19 +232,14 @@ impl<C: Clock> Hybrid<'_, C> {
         let order = spread_order(self.tiles.len(), frame.sample);
         let limit = Duration::try_from_secs_f64(SLOWEST_PART * costs.render);
         let limit = limit.unwrap_or(Duration::MAX);
-        let mut pairs: Vec<Pair> = Vec::new();
+        let mut evidence = Evidence::default();
         let (mut candidate_times, mut incumbent_times) = (Vec::new(), Vec::new());
         let mut found = Err(TrialFailure::Unmeasured);
         let mut begin = 0;
-        for (index, share) in SHARES.into_iter().enumerate() {
+        for share in SHARES {
             let end = 2 * ((share * order.len() as f64) as usize).min(order.len() / 2);
             let part = &order[begin.min(end)..end];
             begin = end;
-            // A tree that was built just now lies in the caches, and the other does not: the first tiles say
-            // whether the candidate is hopeless, and no more.
-            if index == 1 {
-                pairs.clear();
-            }
             // Even ones are the candidate's.
             let mut trees: Vec<Option<&Bvh>> = vec![None; order.len()];
             for pair in part.chunks_exact(2) {
@@ -252,29 +251,20 @@ impl<C: Clock> Hybrid<'_, C> {
             for &(tile, time) in &times {
                 took[tile] = Some(time);
             }
-            for pair in part.chunks_exact(2) {
+            let pairs = part.chunks_exact(2).filter_map(|pair| {
                 let [own, other] = [pair[0], pair[1]];
                 candidate_times.extend(took[own].map(|time| (own, time)));
                 incumbent_times.extend(took[other].map(|time| (other, time)));
-                if let [Some(time), Some(other_time)] = [took[own], took[other]] {
-                    pairs.push(Pair {
-                        candidate: [time, self.tiles[own]],
-                        incumbent: [other_time, self.tiles[other]],
-                    });
-                }
-            }
+                Some(Pair {
+                    candidate: [took[own]?, self.tiles[own]],
+                    incumbent: [took[other]?, self.tiles[other]],
+                })
+            });
+            let told = evidence.add_part(pairs, costs, before);
             let is_late = times.len() < part.len();
-            if let Some(ratio) = ProbeRatio::of(&pairs) {
-                let all = before.map_or(ratio, |before| before.and(ratio));
-                let decision = costs.decide(all);
-                let is_first = index == 0 && decision == Decision::Accepted;
-                let decision = if is_first {
-                    Decision::Undecided
-                } else {
-                    decision
-                };
-                found = Ok((ratio, all, decision));
-                if decision != Decision::Undecided {
+            if let Some(told) = told {
+                found = Ok(told);
+                if told.2 != Decision::Undecided {
                     break;
                 }
             } else if is_late {
