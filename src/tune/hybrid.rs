@@ -171,7 +171,8 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         })
     }
 
-    /// The same run, in which nothing is tried: all frames with the first parameters.
+    /// The same run, in which nothing is tried: all frames with the first parameters, and no clock is read for a
+    /// tile.
     #[must_use]
     pub fn frozen(mut self) -> Self {
         (self.is_searching, self.is_frozen) = (false, true);
@@ -187,10 +188,10 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self
     }
 
-    /// The same run, in which no frame waits for the tree of a candidate: a thread of `scope` builds it beside the
-    /// frames of the incumbent and yields to them, and the time that is told of such a build is that which the thread worked. Only
-    /// where trees serve any number of frames ([`Metric::Render`](super::Metric::Render)): nothing is built in the
-    /// background where frames bear a share of their build.
+    /// The same run, in which no frame waits for the tree of a candidate: a thread of `scope` builds it beside
+    /// the frames of the incumbent and yields to them. What is told of such a build is the time that the thread
+    /// has worked. Only where trees serve any number of frames ([`Metric::Render`](super::Metric::Render)):
+    /// where frames bear a share of their build, nothing is built in the background.
     ///
     /// ```
     /// use raywright::tune::{Hybrid, Clock, SessionError};
@@ -282,10 +283,12 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let Some((candidate, build)) = tried? else {
             return Ok(None);
         };
-        // Frames beside which something is built tell nothing of the others.
-        if !is_beside {
+        let render = (self.stage.now() - start).saturating_sub(build);
+        if self.is_frozen {
+            self.learn_whole(render);
+        } else if !is_beside {
+            // Frames beside which something is built tell nothing of the others.
             if candidate.is_none() {
-                let render = (self.stage.now() - start).saturating_sub(build);
                 self.learn_sharing(render, &frame.times, FRESH);
             }
             self.watch(&frame.times);
@@ -335,6 +338,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         let render = (self.stage.now() - start).saturating_sub(build);
         self.learn_sharing(render, &frame.times, 1.0);
+        if self.is_frozen {
+            self.learn_whole(render);
+        }
         let config = trial.canonical.clone();
         let incumbent = Incumbent::first(config, self.first, tree, build.as_secs_f64());
         self.incumbent = Some(incumbent);
@@ -571,6 +577,12 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         if share > 0.0 && share.is_finite() {
             self.wall_per_work += weight * (share - self.wall_per_work);
         }
+    }
+
+    /// Learns from a frame whose tiles were not timed.
+    fn learn_whole(&mut self, render: Duration) {
+        let share = render.as_secs_f64() / self.tiles.len() as f64;
+        self.tiles.fill(share);
     }
 
     /// Whether something is still tried.

@@ -267,13 +267,14 @@ impl<'a, C: Clock> Stage<'a, C> {
     }
 
     /// One sample of every pixel of those tiles for which there is a tree, in place of what the film had there;
-    /// what a thread worked for each, in seconds. After `limit` no further tile is begun, nor after a cancellation.
+    /// what each took by `busy`, in seconds. After `limit` no further tile is begun, nor after a cancellation.
     pub(super) fn render_tiles<'t>(
         &self,
         film: &mut Film,
         sample: u32,
         limit: Duration,
         cancel: &CancelToken,
+        busy: impl Fn() -> Duration + Sync,
         tree_of: impl Fn(usize) -> Option<&'t Bvh> + Sync,
     ) -> Result<Vec<(usize, f64)>, SessionError> {
         let projection = self.camera.projection(film.width(), film.height());
@@ -285,15 +286,16 @@ impl<'a, C: Clock> Stage<'a, C> {
             let Some(tree) = tree_of(tile.index) else {
                 return;
             };
-            if cancel.is_cancelled() || self.clock.now() - begun > limit {
+            let is_late = || limit < Duration::MAX && self.clock.now() - begun > limit;
+            if cancel.is_cancelled() || is_late() {
                 return;
             }
-            let start = self.clock.busy();
+            let start = busy();
             for (x, y) in tile.pixels() {
                 *view.pixel_mut(x, y) = Pixel::default();
             }
             shot.render_tile(&projection, tile, view, sample..sample + 1, tree);
-            let time = (self.clock.busy() - start).as_secs_f64();
+            let time = (busy() - start).as_secs_f64();
             let mut times = times.lock().unwrap_or_else(PoisonError::into_inner);
             times.push((tile.index, time));
         });
@@ -311,12 +313,18 @@ impl<'a, C: Clock> Stage<'a, C> {
         cancel: &CancelToken,
     ) -> Result<Option<Duration>, SessionError> {
         let mut film = self.film()?;
-        let times = self.render_tiles(&mut film, sample, limit, cancel, |_| Some(tree))?;
+        let busy = || self.clock.busy();
+        let times = self.render_tiles(&mut film, sample, limit, cancel, busy, |_| Some(tree))?;
         let seconds = times.iter().map(|(_, time)| time).sum();
         let is_whole = times.len() == self.tiles();
         Ok(Duration::try_from_secs_f64(seconds)
             .ok()
             .filter(|_| is_whole))
+    }
+
+    /// Time that the calling thread has worked.
+    pub(super) fn busy(&self) -> Duration {
+        self.clock.busy()
     }
 
     /// Time since a moment that does not change.

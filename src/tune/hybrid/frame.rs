@@ -41,8 +41,9 @@ impl<'c> Frame<'c> {
 }
 
 impl<C: Clock> Hybrid<'_, C> {
-    /// Traces those tiles that are not done and for which there is a tree; what each took, in seconds. No
-    /// tile is begun after `limit`.
+    /// Traces those tiles that are not done and for which there is a tree; what each took, in seconds: 0 where
+    /// nothing is ever tried, since that clock may take half a microsecond to read. No tile is begun after
+    /// `limit`.
     pub(super) fn trace<'t>(
         &self,
         frame: &mut Frame<'_>,
@@ -51,10 +52,16 @@ impl<C: Clock> Hybrid<'_, C> {
     ) -> Result<Vec<(usize, f64)>, SessionError> {
         let done = &frame.done;
         let left = |tile: usize| if done[tile] { None } else { tree_of(tile) };
-        let (film, cancel) = (&mut frame.film, frame.cancel);
-        let times = self
-            .stage
-            .render_tiles(film, frame.sample, limit, cancel, left)?;
+        let (stage, is_timed) = (&self.stage, !self.is_frozen);
+        let busy = || {
+            if is_timed {
+                stage.busy()
+            } else {
+                Duration::ZERO
+            }
+        };
+        let (film, sample, cancel) = (&mut frame.film, frame.sample, frame.cancel);
+        let times = stage.render_tiles(film, sample, limit, cancel, busy, left)?;
         for &(tile, _) in &times {
             frame.done[tile] = true;
         }

@@ -359,3 +359,24 @@ fn where_frames_bear_their_builds_none_is_in_the_background() {
         assert!(frame.candidate.is_some() && frame.build > Duration::ZERO);
     });
 }
+
+#[test]
+fn where_nothing_is_tried_hardly_a_clock_is_read() {
+    let place = place("interior");
+    let clock = OddClock::new(1);
+    let looks = clock.0.clone();
+    let run = hybrid(&place, Metric::Render, &BuildParams::default(), clock);
+    let mut run = run.frozen();
+    run.frame(&CancelToken::new()).unwrap();
+    let before = looks.load(Ordering::Relaxed);
+    let frame = run.frame(&CancelToken::new()).unwrap().unwrap();
+    let looks = looks.load(Ordering::Relaxed) - before;
+    assert!(looks <= 8, "{looks}");
+    // And the cost is told all the same.
+    let cost = Duration::from_secs_f64(run.incumbent_cost().unwrap());
+    assert!(
+        cost > frame.time / 2 && cost <= frame.time,
+        "{cost:?} {frame:?}"
+    );
+    assert!(run.film().mean() == plain(&place, 2).mean());
+}
