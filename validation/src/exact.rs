@@ -1,17 +1,21 @@
-//! All hits in f64, without a tree: where a kernel in f32 may be wrong, and by how much.
+//! All hits in f64: where a kernel in f32 may be wrong, and by how much.
 //!
 //! A triangle is hit if and only if the ray meets it exactly, edges and vertices included: sides of edges are told
-//! by f64 where rounding cannot matter, and by integers else (after Shewchuk, *Adaptive Precision Floating-Point
-//! Arithmetic and Fast Robust Geometric Predicates*, 1997, with integers in place of expansions). A hit is told apart by how surely
-//! it is one: the smallest barycentric weight says how far the ray passes from an edge.
+//! by f64 where rounding cannot matter, and by integers else (see `edge`). A hit is told apart by how surely it is one:
+//! the smallest barycentric weight says how far the ray passes from an edge. [`ExactTree`] tells the same of many rays.
 //!
 //! Invariant: of triangles that share an edge, a ray that passes between their other corners meets at least one.
 
+mod edge;
+mod line;
+mod tree;
+
 use std::cmp::Ordering;
 
-use glam::DVec3;
-use num_bigint::BigInt;
 use raywright_bvh::{Ray, TriangleMesh, Vec3};
+
+pub use self::tree::ExactTree;
+use self::{edge::Edge, line::Line};
 
 /// A hit computed in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,27 +39,39 @@ pub fn all_hits(meshes: &[&TriangleMesh], ray: &Ray) -> Vec<ExactHit> {
     let mut hits = Vec::new();
     for (geometry_id, mesh) in (0..).zip(meshes) {
         for primitive_id in 0..mesh.triangles().len() as u32 {
-            if let Some((t, uv)) = triangle(mesh.corners(primitive_id), ray) {
-                let smallest_weight = uv[0].min(uv[1]).min(1.0 - uv[0] - uv[1]);
-                hits.push(ExactHit {
-                    t,
-                    uv,
-                    geometry_id,
-                    primitive_id,
-                    smallest_weight,
-                });
-            }
+            hits.extend(hit(meshes, [geometry_id, primitive_id], ray));
         }
     }
-    hits.sort_by(|a, b| {
-        a.t.total_cmp(&b.t)
-            .then((a.geometry_id, a.primitive_id).cmp(&(b.geometry_id, b.primitive_id)))
-    });
+    hits.sort_by(order);
     hits
 }
 
+/// The hit of one triangle, if the ray meets it within its interval.
+fn hit(
+    meshes: &[&TriangleMesh],
+    [geometry_id, primitive_id]: [u32; 2],
+    ray: &Ray,
+) -> Option<ExactHit> {
+    let corners = meshes[geometry_id as usize].corners(primitive_id);
+    let (t, uv) = triangle(corners, ray)?;
+    Some(ExactHit {
+        t,
+        uv,
+        geometry_id,
+        primitive_id,
+        smallest_weight: uv[0].min(uv[1]).min(1.0 - uv[0] - uv[1]),
+    })
+}
+
+/// The closest first; of equal ones, the lowest ids.
+fn order(a: &ExactHit, b: &ExactHit) -> Ordering {
+    a.t.total_cmp(&b.t)
+        .then((a.geometry_id, a.primitive_id).cmp(&(b.geometry_id, b.primitive_id)))
+}
+
 /// Distance and weights of vertices 1 and 2, if the ray meets the triangle. Which side of each edge the ray
-/// passes is exact; the numbers are as good as f64 makes them.
+/// passes is exact; the numbers are as good as f64 makes them, and the distance is not outside of where the ray is in
+/// the triangle's box.
 ///
 /// With corners A, B, C as seen from the origin and direction D, the weights are to each other as D·(B×C),
 /// D·(C×A) and D·(A×B).
@@ -70,6 +86,9 @@ fn triangle(corners: [Vec3; 3], ray: &Ray) -> Option<(f64, [f64; 2])> {
     let normal = (v1 - v0).cross(v2 - v0);
     let to_plane = normal.dot(v0 - ray.origin.as_dvec3());
     let t = to_plane / normal.dot(ray.direction.as_dvec3());
+    let (min, max) = (v0.min(v1).min(v2), v0.max(v1).max(v2));
+    let [enter, leave] = Line::new(ray).interval(min, max);
+    let t = t.max(enter).min(leave);
     let is_within = f64::from(ray.t_min) <= t && t <= f64::from(ray.t_max);
     is_within.then(|| (t, [weights[1] / sum, weights[2] / sum]))
 }
@@ -89,76 +108,6 @@ fn are_met(edges: &[Edge; 3], ray: &Ray) -> bool {
     let signs = edges.map(|edge| edge.sign(ray));
     // All zero: the ray lies in the plane, or the triangle has no area.
     signs.contains(&Ordering::Greater) != signs.contains(&Ordering::Less)
-}
-
-/// An edge of a triangle, beside a ray.
-#[derive(Clone, Copy)]
-struct Edge {
-    ends: [Vec3; 2],
-    /// D·(P×Q) for the ends P and Q as seen from the origin.
-    value: f64,
-    /// The sum of the magnitudes of its terms.
-    magnitude: f64,
-}
-
-/// A value is off by less than ten roundings of its terms.
-const SURE: f64 = 1e-14;
-
-impl Edge {
-    fn new(p: Vec3, q: Vec3, ray: &Ray) -> Self {
-        let [origin, direction] = [ray.origin, ray.direction].map(Vec3::as_dvec3);
-        let [from, to] = [p, q].map(|end| end.as_dvec3() - origin);
-        let magnitude = |x: DVec3| x.abs();
-        let [d, f, t] = [direction, from, to].map(magnitude);
-        Self {
-            ends: [p, q],
-            value: direction.dot(from.cross(to)),
-            magnitude: d.x * (f.y * t.z + f.z * t.y)
-                + d.y * (f.z * t.x + f.x * t.z)
-                + d.z * (f.x * t.y + f.y * t.x),
-        }
-    }
-
-    /// On which side of the edge the ray passes: that of the value if it is surely not 0, else by integers.
-    fn sign(&self, ray: &Ray) -> Ordering {
-        if self.value.abs() > SURE * self.magnitude {
-            return self.value.total_cmp(&0.0);
-        }
-        self.exact_sign(ray)
-    }
-
-    /// The same by integers: every f32 is one, times 2⁻¹⁴⁹.
-    fn exact_sign(&self, ray: &Ray) -> Ordering {
-        let integers = |v: Vec3| v.to_array().map(integer);
-        let [origin, direction] = [ray.origin, ray.direction].map(integers);
-        let [p, q] = self.ends.map(|end| {
-            let end = integers(end);
-            [0, 1, 2].map(|axis| &end[axis] - &origin[axis])
-        });
-        let sum: BigInt = (0..3)
-            .map(|x| {
-                let (y, z) = ((x + 1) % 3, (x + 2) % 3);
-                &direction[x] * (&p[y] * &q[z] - &p[z] * &q[y])
-            })
-            .sum();
-        sum.cmp(&BigInt::ZERO)
-    }
-}
-
-/// `value` · 2¹⁴⁹; 0 if it is not finite.
-fn integer(value: f32) -> BigInt {
-    let bits = value.to_bits();
-    let (exponent, fraction) = ((bits >> 23) & 0xff, bits & 0x7f_ffff);
-    let magnitude = match exponent {
-        0 => BigInt::from(fraction),
-        0xff => BigInt::ZERO,
-        _ => BigInt::from(fraction | 0x80_0000) << (exponent - 1),
-    };
-    if value.is_sign_negative() {
-        -magnitude
-    } else {
-        magnitude
-    }
 }
 
 #[cfg(test)]
@@ -181,18 +130,8 @@ mod tests {
         assert!(all_hits(&[&mesh], &ray.with_range(0.0, 1.4)).is_empty());
     }
 
-    #[test]
-    fn integers_are_the_numbers() {
-        for value in [0.0, 1.5, -2.75, 1e-45, -3e-39, f32::MAX, f32::MIN_POSITIVE] {
-            let expected = f64::from(value) * 2.0_f64.powi(149);
-            let digits = integer(value).to_string();
-            assert_eq!(digits.parse::<f64>().unwrap(), expected, "{value}");
-        }
-        assert_eq!(integer(f32::INFINITY), BigInt::ZERO);
-    }
-
     /// Numbers of many sizes, from a linear congruence.
-    fn numbers() -> impl FnMut() -> f32 {
+    pub(super) fn numbers() -> impl FnMut() -> f32 {
         let mut state = 12345_u64;
         move || {
             state = state
@@ -201,25 +140,6 @@ mod tests {
             let unit = (state >> 40) as f32 / (1 << 24) as f32 - 0.5;
             unit * f32::powi(2.0, ((state >> 35) & 15) as i32 - 8)
         }
-    }
-
-    #[test]
-    fn both_ways_to_a_sign_agree() {
-        let mut number = numbers();
-        let mut vector = || Vec3::new(number(), number(), number());
-        let mut unsure = 0;
-        for _ in 0..20_000 {
-            let (p, q) = (vector(), vector());
-            // Toward a point of the edge, so that signs are not all sure.
-            let origin = vector();
-            let ray = Ray::new(origin, p + 0.25 * (q - p) - origin);
-            let edge = Edge::new(p, q, &ray);
-            unsure += u32::from(edge.value.abs() <= SURE * edge.magnitude);
-            assert_eq!(edge.sign(&ray), edge.exact_sign(&ray));
-            // Seen from the other triangle at the edge.
-            assert_eq!(Edge::new(q, p, &ray).sign(&ray), edge.sign(&ray).reverse());
-        }
-        assert!(unsure > 0);
     }
 
     #[test]

@@ -10,11 +10,12 @@
 //! | [`embree`] | the same, for any input and parameters | the library itself, if it is there |
 //! | [`random`] | the same, over many | random triangles and parameters |
 //!
-//! The program of this crate asks the last two questions; see its `--help`:
+//! The program of this crate asks all but the first of them; see its `--help`:
 //!
 //! ```text
 //! cargo run --release -p raywright-validation -- trees            # all golden lines
 //! cargo run --release -p raywright-validation -- trees --random   # random builds beside Embree
+//! cargo run --release -p raywright-validation -- hits             # rays beside Embree and exact hits
 //! ```
 //!
 //! Features: `golden` (the files), `embree` (the library, loaded at run time), `cli` (the program,

@@ -7,14 +7,18 @@
 //! sheared corners (Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, 2013).
 
 use glam::DVec3;
-use raywright_bvh::{Ray, Vec3};
+use raywright_bvh::{Accuracy, Ray, Vec3};
 
+use super::{
+    clamp::clamped,
+    sheared::{Shear, axes_of},
+};
 use crate::exact;
 
 /// Rounding of f32.
 const UNIT: f64 = 1.0 / (1 << 24) as f64;
 
-fn gamma(n: f64) -> f64 {
+pub(super) fn gamma(n: f64) -> f64 {
     n * UNIT / (1.0 - n * UNIT)
 }
 
@@ -38,10 +42,10 @@ pub struct Evaluation {
     /// How far inside of its edges the ray passes, in bounds of the error: above 1 no test may miss it, below −1
     /// none may hit it; by edges opposite to vertices 0, 1, 2.
     pub margins: [f64; 3],
-    /// Distance to its plane, and bound of the error.
+    /// Distance to its plane.
     pub t: f64,
-    /// The bound.
-    pub t_bound: f64,
+    /// What a test may find for it: from, to.
+    pub t_range: [f64; 2],
     /// Weights of vertices 1 and 2.
     pub uv: [f64; 2],
     /// Bound of the error of either.
@@ -53,7 +57,27 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Of a triangle, for tests of a form.
+    /// Of a triangle, for our test of an accuracy, if coordinates are below `coordinate_bound`: the power of two above
+    /// the largest of the scene's.
+    #[must_use]
+    pub fn of_ours(
+        corners: [Vec3; 3],
+        ray: &Ray,
+        accuracy: Accuracy,
+        coordinate_bound: f64,
+    ) -> Self {
+        let form = match accuracy {
+            Accuracy::Fast => TriangleTestForm::MollerTrumbore,
+            Accuracy::Robust => TriangleTestForm::Sheared,
+        };
+        let free = Self::new(corners, ray, form);
+        Self {
+            t_range: clamped(free.t_range, corners, ray, accuracy, coordinate_bound),
+            ..free
+        }
+    }
+
+    /// Of a triangle, for tests of a form that leave the distance as it is.
     #[must_use]
     pub fn new(corners: [Vec3; 3], ray: &Ray, form: TriangleTestForm) -> Self {
         let origin = ray.origin.as_dvec3();
@@ -74,12 +98,16 @@ impl Evaluation {
         let weights = values.map(|value| value / sum);
         let weight_bounds =
             [0, 1, 2].map(|i| (bounds[i] + weights[i].abs() * sum_bound) / sure + 2.0 * UNIT);
-        let (t, t_bound) = distance([a, b, c], direction, weights, weight_bounds);
+        let (t, bound) = distance([a, b, c], direction, form, weights, weight_bounds);
         Self {
             is_met: exact::is_met(corners, ray),
             margins,
             t,
-            t_bound,
+            t_range: if bound < f64::INFINITY {
+                [t - bound, t + bound]
+            } else {
+                [f64::NEG_INFINITY, f64::INFINITY]
+            },
             uv: [weights[1], weights[2]],
             uv_bound: weight_bounds[1].max(weight_bounds[2]),
             is_ill_conditioned,
@@ -122,47 +150,22 @@ fn edge_sums([a, b, c]: [DVec3; 3], d: DVec3) -> ([f64; 3], [f64; 3]) {
     (triple_products([a, b, c], d), bounds)
 }
 
-/// The same of sheared corners. A component of a sheared corner is off by four roundings of its terms; the products of
-/// two of them by what these make of each other, and two roundings.
+/// The same of sheared corners: bounds of what their ends and their own products are off by.
 fn sheared(corners: [DVec3; 3], d: DVec3) -> ([f64; 3], [f64; 3]) {
-    let size = d.abs();
-    // The largest last; of equal ones, the first.
-    let axes = if size.x >= size.y && size.x >= size.z {
-        [1, 2, 0]
-    } else if size.y >= size.z {
-        [2, 0, 1]
-    } else {
-        [0, 1, 2]
-    };
-    let [x, y, z] = axes.map(|axis| d[axis]);
-    let shear = [x / z, y / z];
-    let points = corners.map(|corner| {
-        let along = corner[axes[2]];
-        [0, 1].map(|i| {
-            let (own, moved) = (corner[axes[i]], shear[i] * along);
-            (own - moved, gamma(4.0) * (own.abs() + moved.abs()))
-        })
-    });
-    let [a, b, c] = points;
-    // (value, bound) of p × q in the plane, seen along the ray: the sign is that of D·(P×Q).
-    let edge = |p: [(f64, f64); 2], q: [(f64, f64); 2]| {
-        let product = |(a, e): (f64, f64), (b, f): (f64, f64)| {
-            (
-                a * b,
-                a.abs() * f + b.abs() * e + e * f + gamma(2.0) * (a * b).abs(),
-            )
-        };
-        let (left, right) = (product(p[0], q[1]), product(p[1], q[0]));
-        (z.signum() * (left.0 - right.0), left.1 + right.1)
-    };
-    let edges = [edge(b, c), edge(c, a), edge(a, b)];
-    (edges.map(|edge| edge.0), edges.map(|edge| edge.1))
+    let shear = Shear::new(d);
+    let [a, b, c] = corners.map(|corner| shear.point(corner));
+    let sides = [(b, c), (c, a), (a, b)].map(|(p, q)| shear.side(p, q));
+    (
+        sides.map(|side| shear.sign * side.value),
+        sides.map(|side| side.moved + side.rounded),
+    )
 }
 
-/// Where the ray meets the plane, and how far off a test may be that finds it by weights or by the normal.
+/// Where the ray meets the plane, and how far off a test of the form may be.
 fn distance(
     [a, b, c]: [DVec3; 3],
     direction: DVec3,
+    form: TriangleTestForm,
     weights: [f64; 3],
     weight_bounds: [f64; 3],
 ) -> (f64, f64) {
@@ -170,40 +173,45 @@ fn distance(
     let normal = e1.cross(e2);
     let along = normal.dot(direction);
     let t = normal.dot(a) / along;
-    // By the normal: its components are sums of two products.
-    let along_bound = gamma(7.0) * terms(direction, e1, e2);
-    let plane_bound = gamma(8.0) * terms(a, e1, e2);
-    let sure = along.abs() - along_bound;
-    let by_normal = (plane_bound + t.abs() * along_bound) / sure;
-    // By the weights: along the largest axis of the direction.
-    let size = direction.abs();
-    let axis = if size.x >= size.y && size.x >= size.z {
-        0
-    } else if size.y >= size.z {
-        1
-    } else {
-        2
+    let bound = match form {
+        TriangleTestForm::Sheared => {
+            let [_, _, axis] = axes_of(direction);
+            by_weights([a[axis], b[axis], c[axis]], weights, weight_bounds) / direction[axis].abs()
+        }
+        // By the normal, whose components are sums of two products.
+        TriangleTestForm::MollerTrumbore | TriangleTestForm::EdgeSums => {
+            let along_bound = gamma(7.0) * terms(direction, e1, e2);
+            let plane_bound = gamma(8.0) * terms(a, e1, e2);
+            let sure = along.abs() - along_bound;
+            let bound = (plane_bound + t.abs() * along_bound) / sure;
+            if sure > 0.0 { bound } else { f64::INFINITY }
+        }
     };
-    let corners = [a, b, c];
-    let off: f64 = (0..3)
-        .map(|i| {
-            let along = corners[i][axis].abs();
-            weight_bounds[i] * along + gamma(6.0) * weights[i].abs() * along
-        })
-        .sum();
-    let by_weights = off / size[axis];
-    let bound = by_normal.max(by_weights) + 2.0 * UNIT * t.abs();
+    // A quotient in the last two places; that of the other tracer by a reciprocal and a step of Newton's.
+    let quotient = match form {
+        TriangleTestForm::Sheared | TriangleTestForm::MollerTrumbore => 2.0,
+        TriangleTestForm::EdgeSums => 6.0,
+    };
+    let bound = bound + quotient * UNIT * t.abs();
     // Beyond what is certain: anything.
-    let bound = if sure > 0.0 && bound >= 0.0 {
-        bound
-    } else {
-        f64::INFINITY
+    let is_certain = bound >= 0.0 && weight_bounds.iter().all(|&bound| bound >= 0.0);
+    (t, if is_certain { bound } else { f64::INFINITY })
+}
+
+/// How far off A + v·(B − A) + w·(C − A) may be, with corners that one subtraction made. The weight of A is what the
+/// others leave: an error of v counts by the length of an edge, even where all of the weight is at a corner that is
+/// near. Each term is rounded in its corners, the difference, the product and two sums.
+fn by_weights([a, b, c]: [f64; 3], weights: [f64; 3], weight_bounds: [f64; 3]) -> f64 {
+    let term = |i: usize, end: f64| {
+        weight_bounds[i] * (end - a).abs() + gamma(5.0) * weights[i].abs() * (end.abs() + a.abs())
     };
-    (t, bound)
+    term(1, b) + term(2, c) + gamma(3.0) * a.abs()
 }
 
 #[cfg(test)]
 mod tests {
+    use raywright_bvh::{BuildParams, Bvh, TriangleMesh};
+
     use super::*;
 
     #[test]
@@ -228,7 +236,9 @@ mod tests {
                 assert!((evaluation.t - 3.0).abs() < 1e-12);
                 assert!((evaluation.uv[0] - 0.25).abs() < 1e-12);
                 assert!((evaluation.uv[1] - 0.3125).abs() < 1e-12);
-                assert!(evaluation.t_bound < 1e-4 && evaluation.uv_bound < 1e-4);
+                let [from, to] = evaluation.t_range;
+                assert!(from < 3.0 && to > 3.0 && to - from < 2e-4);
+                assert!(evaluation.uv_bound < 1e-4);
                 assert!(!evaluation.is_ill_conditioned);
             }
             assert_eq!(products.orientation > 0.0, sheared.orientation > 0.0);
@@ -246,6 +256,37 @@ mod tests {
         let in_plane = Ray::new([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]);
         let evaluation = Evaluation::new(corners, &in_plane, form);
         assert!(!evaluation.is_met && evaluation.is_ill_conditioned);
-        assert_eq!(evaluation.t_bound, f64::INFINITY);
+        assert_eq!(evaluation.t_range, [f64::NEG_INFINITY, f64::INFINITY]);
+        // Ours stays near the box: the plane x = 0 at 1, the plane x = 1 at 2.
+        let [from, to] = Evaluation::of_ours(corners, &in_plane, Accuracy::Robust, 2.0).t_range;
+        assert!(0.99999 < from && from < 1.0 && 2.0 < to && to < 2.00001);
+    }
+
+    /// The floor of the conference room, met 5 units away at a corner, by weights of edges of 2,600 units.
+    #[test]
+    fn a_distance_is_off_by_errors_of_weights_times_edges() {
+        let corners = [
+            Vec3::new(-946.888, -1.57216, 668.489),
+            Vec3::new(1653.25, -1.57216, 668.489),
+            Vec3::new(1653.25, -1.57216, -1016.1),
+        ];
+        let ray = Ray::new(
+            [1650.5236, -2.4062593, -1005.6227],
+            [-0.77985334, 0.16286229, 0.60440475],
+        );
+        let evaluation = Evaluation::of_ours(corners, &ray, Accuracy::Robust, 2048.0);
+        assert!((evaluation.t - 5.121_500_584).abs() < 1e-9 && evaluation.margin() > 1e3);
+        let [from, to] = evaluation.t_range;
+        // No farther than the pad of the triangle's box, which is flat.
+        assert!(evaluation.t - from < 7e-3 && to - evaluation.t < 7e-3);
+        let mesh = TriangleMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let mut params = BuildParams::default();
+        params.accuracy = Accuracy::Robust;
+        let hit = Bvh::build(&[&mesh], &params).unwrap().closest_hit(&ray);
+        let t = f64::from(hit.unwrap().t);
+        assert!(
+            (t - evaluation.t).abs() > 4e-4 && from <= t && t <= to,
+            "{t}"
+        );
     }
 }

@@ -1,96 +1,30 @@
 //! What the difference of two answers is.
+//!
+//! Bounds of the errors of numbers tell what is out of question (`evaluate`, `clamp`); where a ray passes within the
+//! bound of an edge, the triangles around it tell whether a miss can be right (`patch`).
 
 use std::collections::HashMap;
 
 use raywright_bvh::{Accuracy, Ray, TriangleMesh, Vec3};
 
-use super::evaluate::{Evaluation, TriangleTestForm};
-
-/// What a tracer says of a ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
-    /// Distance in units of the direction.
-    pub t: f32,
-    /// Weights of vertices 1 and 2.
-    pub uv: [f32; 2],
-    /// Which mesh, and which of its triangles.
-    pub ids: [u32; 2],
-}
-
-/// What two answers to one ray are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[non_exhaustive]
-pub enum Class {
-    /// The same triangle, or both none.
-    Same,
-    /// Two triangles at an edge or a vertex that both may have.
-    EdgeTie,
-    /// Two triangles at the same distance.
-    CoplanarTie,
-    /// One misses a triangle that the ray touches at the outline of what it sees.
-    SilhouetteTie,
-    /// A hit at an end of the ray.
-    IntervalTie,
-    /// A triangle that is seen so nearly edge-on, or is so thin, that nothing is certain.
-    IllConditioned,
-    /// Ours is right; the other misses what it must hit.
-    OtherMisses,
-    /// Ours is right; the other hits what it must not.
-    OtherInvents,
-    /// Ours misses what it touches exactly at an edge or vertex within a surface: a fault of a watertight test,
-    /// and what a fast one may do.
-    Leak,
-    /// Ours is wrong.
-    Bug,
-}
-
-impl Class {
-    /// All, in the order of tables.
-    pub const ALL: [Self; 10] = [
-        Self::Same,
-        Self::EdgeTie,
-        Self::CoplanarTie,
-        Self::SilhouetteTie,
-        Self::IntervalTie,
-        Self::IllConditioned,
-        Self::OtherMisses,
-        Self::OtherInvents,
-        Self::Leak,
-        Self::Bug,
-    ];
-
-    /// Its name in tables.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Same => "same",
-            Self::EdgeTie => "edge tie",
-            Self::CoplanarTie => "coplanar tie",
-            Self::SilhouetteTie => "silhouette tie",
-            Self::IntervalTie => "interval tie",
-            Self::IllConditioned => "ill-conditioned",
-            Self::OtherMisses => "other misses",
-            Self::OtherInvents => "other invents",
-            Self::Leak => "leak",
-            Self::Bug => "bug",
-        }
-    }
-}
-
-/// Whose place is the same, to the last bit; −0 is 0.
-type Place = [u32; 3];
-
-fn place(vertex: Vec3) -> Place {
-    vertex.to_array().map(|x| (x + 0.0).to_bits())
-}
+use super::{
+    clamp::power_of_two_below,
+    class::{Answer, Class},
+    evaluate::{Evaluation, TriangleTestForm},
+    patch::{self, EdgeKey, Place},
+    sheared::Shear,
+};
+use crate::exact::ExactHit;
 
 /// Judges answers about some meshes.
 #[derive(Debug)]
 pub struct Judge<'m> {
     meshes: &'m [&'m TriangleMesh],
     accuracy: Accuracy,
-    /// Triangles at each edge, the smaller place first.
-    neighbours: HashMap<[Place; 2], Vec<[u32; 2]>>,
+    /// The power of two above the largest coordinate.
+    coordinate_bound: f64,
+    /// Triangles at each edge.
+    neighbours: HashMap<EdgeKey, Vec<[u32; 2]>>,
 }
 
 impl<'m> Judge<'m> {
@@ -98,9 +32,14 @@ impl<'m> Judge<'m> {
     #[must_use]
     pub fn new(meshes: &'m [&'m TriangleMesh], accuracy: Accuracy) -> Self {
         let mut neighbours: HashMap<_, Vec<_>> = HashMap::new();
+        let mut largest = 0.0_f32;
         for (geometry, mesh) in (0..).zip(meshes) {
             for primitive in 0..mesh.triangles().len() as u32 {
-                let places = mesh.corners(primitive).map(place);
+                let corners = mesh.corners(primitive);
+                for corner in corners {
+                    largest = largest.max(corner.abs().max_element());
+                }
+                let places = corners.map(place);
                 for i in 0..3 {
                     let mut ends = [places[i], places[(i + 1) % 3]];
                     ends.sort_unstable();
@@ -114,6 +53,7 @@ impl<'m> Judge<'m> {
         Self {
             meshes,
             accuracy,
+            coordinate_bound: 2.0 * power_of_two_below(largest),
             neighbours,
         }
     }
@@ -122,136 +62,178 @@ impl<'m> Judge<'m> {
         self.meshes[geometry as usize].corners(primitive)
     }
 
-    fn own_form(&self) -> TriangleTestForm {
-        match self.accuracy {
-            Accuracy::Fast => TriangleTestForm::MollerTrumbore,
-            Accuracy::Robust => TriangleTestForm::Sheared,
-        }
+    fn by_ours(&self, ids: [u32; 2], ray: &Ray) -> Evaluation {
+        Evaluation::of_ours(self.corners(ids), ray, self.accuracy, self.coordinate_bound)
     }
 
-    /// That of the other, which is taken for Embree.
-    fn other_form(&self) -> TriangleTestForm {
-        match self.accuracy {
-            Accuracy::Fast => TriangleTestForm::MollerTrumbore,
-            Accuracy::Robust => TriangleTestForm::EdgeSums,
-        }
+    /// Up to where exact hits tell anything of our answer.
+    #[must_use]
+    pub fn farthest(&self, ray: &Ray, ours: Option<Answer>) -> f64 {
+        ours.map_or(f64::INFINITY, |answer| {
+            self.by_ours(answer.ids, ray).t_range[1].max(f64::from(answer.t))
+        })
     }
 
-    /// What our answer is beside another.
+    /// What our answer is beside all triangles that the ray meets up to [`Self::farthest`], the closest first: the
+    /// worst that it is beside any of them.
+    #[must_use]
+    pub fn class_beside_all(&self, ray: &Ray, ours: Option<Answer>, hits: &[ExactHit]) -> Class {
+        let classes = hits.iter().map(|hit| {
+            let ids = [hit.geometry_id, hit.primitive_id];
+            self.class_beside(ray, ours, Some((ids, self.by_ours(ids, ray))))
+        });
+        let worst = classes.filter(|&class| class != Class::OtherMisses).max();
+        worst.unwrap_or_else(|| self.class_beside(ray, ours, None))
+    }
+
+    /// What our answer is beside that of another tracer, which is taken for Embree.
     #[must_use]
     pub fn class(&self, ray: &Ray, ours: Option<Answer>, other: Option<Answer>) -> Class {
-        let own = ours.map(|answer| {
-            let evaluation = Evaluation::new(self.corners(answer.ids), ray, self.own_form());
-            (answer, evaluation)
+        let form = match self.accuracy {
+            Accuracy::Fast => TriangleTestForm::MollerTrumbore,
+            Accuracy::Robust => TriangleTestForm::EdgeSums,
+        };
+        let other = other.map(|Answer { ids, .. }| {
+            let evaluation = Evaluation::new(self.corners(ids), ray, form);
+            (ids, evaluation)
         });
-        if let Some((answer, evaluation)) = &own
-            && let Some(fault) = wrong(ray, answer, evaluation)
+        self.class_beside(ray, ours, other)
+    }
+
+    /// What our answer is beside a triangle that another names.
+    fn class_beside(
+        &self,
+        ray: &Ray,
+        ours: Option<Answer>,
+        other: Option<([u32; 2], Evaluation)>,
+    ) -> Class {
+        let own = ours.map(|answer| (answer, self.by_ours(answer.ids, ray)));
+        if let Some((answer, own)) = &own
+            && is_wrong(ray, answer, own)
         {
-            return fault;
+            return Class::Bug;
         }
-        let Some(other) = other else {
+        let Some((ids, theirs)) = other else {
             return match own {
                 None => Class::Same,
-                Some((_, own)) => missed_by_other(ray, &own),
+                Some((answer, own)) => self.missed_by_other(ray, answer.ids, &own, f64::INFINITY),
             };
         };
-        if own.is_some_and(|(answer, _)| answer.ids == other.ids) {
+        if own.is_some_and(|(answer, _)| answer.ids == ids) {
             return Class::Same;
         }
-        let theirs = Evaluation::new(self.corners(other.ids), ray, self.other_form());
-        if let Some((_, own)) = &own {
-            let apart = theirs.t - own.t;
-            if apart.is_nan() || apart.abs() <= own.t_bound + theirs.t_bound {
-                let at_edges = own.margin() <= 1.0 && theirs.margin() <= 1.0;
-                return if at_edges {
+        if let Some((answer, own)) = &own {
+            if own.t_range[0] <= theirs.t_range[1] && theirs.t_range[0] <= own.t_range[1] {
+                return if own.is_ill_conditioned || theirs.is_ill_conditioned {
+                    Class::IllConditioned
+                } else if own.margin() <= 1.0 && theirs.margin() <= 1.0 {
                     Class::EdgeTie
                 } else {
                     Class::CoplanarTie
                 };
             }
-            if apart > 0.0 {
-                return missed_by_other(ray, own);
+            if theirs.t_range[0] > own.t_range[1] {
+                return self.missed_by_other(ray, answer.ids, own, theirs.t_range[0]);
             }
         }
-        self.missed(ray, other.ids, &theirs)
+        let before = own.map_or(f64::INFINITY, |(_, own)| own.t_range[0]);
+        self.missed(ray, ids, &theirs, before)
     }
 
-    /// Ours misses a triangle that the other hits, and hits nothing at its distance.
-    fn missed(&self, ray: &Ray, ids: [u32; 2], theirs: &Evaluation) -> Class {
-        if is_at_end(ray, theirs) {
+    /// Ours misses a triangle that the other hits, and hits nothing before a distance.
+    fn missed(&self, ray: &Ray, ids: [u32; 2], theirs: &Evaluation, before: f64) -> Class {
+        let own = self.by_ours(ids, ray);
+        if is_at_end(ray, theirs) || is_at_end(ray, &own) {
             return Class::IntervalTie;
         }
-        if theirs.is_ill_conditioned {
-            return Class::IllConditioned;
+        let is_ill_conditioned = theirs.is_ill_conditioned || own.is_ill_conditioned;
+        // Ours may find it behind what it hits, though the other may not.
+        if own.t_range[1] >= before {
+            return if is_ill_conditioned {
+                Class::IllConditioned
+            } else {
+                Class::CoplanarTie
+            };
         }
-        let own = Evaluation::new(self.corners(ids), ray, self.own_form());
-        if own.is_ill_conditioned {
-            return Class::IllConditioned;
+        if own.margin() > 1.0 && !is_ill_conditioned {
+            return Class::Bug;
         }
-        match own.margin() {
-            margin if margin > 1.0 => Class::Bug,
-            _ if self.is_at_outline(ray, ids, &own) => Class::SilhouetteTie,
-            _ if own.is_met => Class::Leak,
-            _ if theirs.margin() >= -1.0 => Class::EdgeTie,
-            _ => Class::OtherInvents,
+        // However thin a triangle is.
+        if !self.may_pass(ray, ids, before) {
+            return Class::Leak;
+        }
+        if is_ill_conditioned {
+            Class::IllConditioned
+        } else if own.is_met || own.margin() >= -1.0 {
+            Class::SilhouetteTie
+        } else if theirs.margin() >= -1.0 {
+            Class::EdgeTie
+        } else {
+            Class::OtherInvents
         }
     }
 
-    /// Whether an edge that the ray passes within the bound of the error has nothing on its other side.
-    fn is_at_outline(&self, ray: &Ray, ids: [u32; 2], own: &Evaluation) -> bool {
-        let corners = self.corners(ids);
-        (0..3).filter(|&i| own.margins[i] <= 1.0).any(|i| {
-            let ends = [corners[(i + 1) % 3], corners[(i + 2) % 3]];
-            let side = side(ends, corners[i], ray);
-            let mut key = ends.map(place);
-            key.sort_unstable();
-            let others = self.neighbours.get(&key).into_iter().flatten();
-            let mut beyond = others.filter(|&&other| other != ids).map(|&other| {
-                let corners = self.corners(other);
-                let third = corners
-                    .into_iter()
-                    .find(|&corner| !key.contains(&place(corner)));
-                third.map_or(0.0, |third| self::side(ends, third, ray))
-            });
-            !beyond.any(|other| other * side < 0.0)
-        })
+    /// The other misses a triangle that ours hits, and hits nothing before a distance.
+    fn missed_by_other(&self, ray: &Ray, ids: [u32; 2], own: &Evaluation, before: f64) -> Class {
+        if is_at_end(ray, own) {
+            Class::IntervalTie
+        } else if own.is_ill_conditioned {
+            Class::IllConditioned
+        } else if own.margin() > 1.0 || own.is_met || !self.may_pass(ray, ids, before) {
+            Class::OtherMisses
+        } else {
+            Class::SilhouetteTie
+        }
+    }
+
+    /// Whether rounding may let a ray pass a triangle and all that meet it there, as far as what is hit lies within the
+    /// ray, and before a distance.
+    fn may_pass(&self, ray: &Ray, ids: [u32; 2], before: f64) -> bool {
+        let origin = ray.origin.as_dvec3();
+        let shear = Shear::new(ray.direction.as_dvec3());
+        patch::may_be_passed(
+            &shear,
+            ids,
+            |ids| {
+                let corners = self.corners(ids);
+                patch::Corners {
+                    places: corners.map(place),
+                    points: corners.map(|corner| shear.point(corner.as_dvec3() - origin)),
+                }
+            },
+            |edge| self.neighbours.get(edge).map_or(&[], Vec::as_slice),
+            |ids| {
+                let [from, to] = self.by_ours(ids, ray).t_range;
+                from >= f64::from(ray.t_min) && to <= f64::from(ray.t_max) && to < before
+            },
+        )
     }
 }
 
-/// On which side of an edge a point is, as the ray sees it: 1 or −1.
-fn side([p, q]: [Vec3; 2], point: Vec3, ray: &Ray) -> f64 {
-    let [p, q, point] = [p, q, point].map(Vec3::as_dvec3);
-    let normal = ray.direction.as_dvec3().cross(q - p);
-    normal.dot(point - p).signum()
+fn place(vertex: Vec3) -> Place {
+    vertex.to_array().map(|x| (x + 0.0).to_bits())
 }
 
-/// What is wrong with our own hit, if anything.
-fn wrong(ray: &Ray, answer: &Answer, own: &Evaluation) -> Option<Class> {
-    if own.is_ill_conditioned {
-        return Some(Class::IllConditioned);
-    }
+/// Whether our own hit is none, or not where it is said to be.
+fn is_wrong(ray: &Ray, answer: &Answer, own: &Evaluation) -> bool {
     let t = f64::from(answer.t);
-    let off = answer.uv.map(f64::from);
-    let is_off = (t - own.t).abs() > own.t_bound
-        || (0..2).any(|i| (off[i] - own.uv[i]).abs() > own.uv_bound);
-    let is_invented = !own.is_met && own.margin() < -1.0;
-    let is_outside = !(ray.t_min <= answer.t && answer.t <= ray.t_max);
-    (is_off || is_invented || is_outside || answer.t.is_nan()).then_some(Class::Bug)
-}
-
-/// The other misses what we hit.
-fn missed_by_other(ray: &Ray, own: &Evaluation) -> Class {
-    if is_at_end(ray, own) {
-        Class::IntervalTie
-    } else if own.margin() > 1.0 || own.is_met {
-        Class::OtherMisses
-    } else {
-        Class::SilhouetteTie
+    let is_near = own.t_range[0] <= t && t <= own.t_range[1];
+    let is_within = ray.t_min <= answer.t && answer.t <= ray.t_max;
+    if !is_near || !is_within {
+        return true;
     }
+    let is_off = (0..2).any(|i| (f64::from(answer.uv[i]) - own.uv[i]).abs() > own.uv_bound);
+    let is_invented = !own.is_met && own.margin() < -1.0;
+    !own.is_ill_conditioned && (is_off || is_invented)
 }
 
 fn is_at_end(ray: &Ray, evaluation: &Evaluation) -> bool {
+    let [from, to] = evaluation.t_range;
     [ray.t_min, ray.t_max]
+        .map(f64::from)
         .iter()
-        .any(|&end| (f64::from(end) - evaluation.t).abs() <= evaluation.t_bound)
+        .any(|&end| from <= end && end <= to)
 }
+
+#[cfg(test)]
+mod tests;
