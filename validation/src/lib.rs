@@ -31,6 +31,8 @@ pub mod hits;
 #[cfg(all(feature = "embree", feature = "golden"))]
 pub mod random;
 pub mod tree;
+#[cfg(feature = "trends")]
+pub mod trends;
 mod triangles;
 pub mod z_test;
 
