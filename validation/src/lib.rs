@@ -28,6 +28,8 @@ pub mod exact;
 pub mod golden;
 #[cfg(feature = "golden")]
 pub mod hits;
+#[cfg(feature = "kit")]
+pub mod kit;
 #[cfg(all(feature = "embree", feature = "golden"))]
 pub mod random;
 pub mod tree;

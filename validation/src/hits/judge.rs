@@ -218,11 +218,12 @@ impl<'m> Judge<'m> {
     }
 }
 
-/// On which side of an edge a point is, as the ray sees it: 1 or −1.
+/// On which side of an edge a point is, as the ray sees it: 1 or −1, or 0 if it is on its line.
 fn side([p, q]: [Vec3; 2], point: Vec3, ray: &Ray) -> f64 {
     let [p, q, point] = [p, q, point].map(Vec3::as_dvec3);
     let normal = ray.direction.as_dvec3().cross(q - p);
-    normal.dot(point - p).signum()
+    let side = normal.dot(point - p);
+    if side == 0.0 { 0.0 } else { side.signum() }
 }
 
 /// What is wrong with our own hit, if anything.

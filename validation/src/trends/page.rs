@@ -202,7 +202,7 @@ fn numbers(html: &mut String, trends: &[&Trend]) {
     }
     *html += "<th>ρ<th>interval<th class=t>the same direction";
     for trend in trends {
-        for engine in 0..2 {
+        for (engine, name) in ENGINES.into_iter().enumerate() {
             let series = &trend.series[engine];
             if series.rounds.is_empty() {
                 continue;
@@ -213,7 +213,7 @@ fn numbers(html: &mut String, trends: &[&Trend]) {
                 escaped(&trend.scene),
                 trend.quantity.name(),
                 trend.quantity.unit(),
-                ENGINES[engine]
+                name
             );
             let medians = series.medians();
             for place in 0..values.len() {
