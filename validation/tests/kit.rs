@@ -55,9 +55,9 @@ fn right(corners: [Vec3; 3], ray: &Ray) -> Tested {
     tested.filter(|&(t, _)| is_met && is_within(ray, t))
 }
 
-fn looped<T: Fn([Vec3; 3], &Ray) -> Tested>(test: T) -> impl Fn(&TriangleMesh) -> Loop<T>
+fn looped<T>(test: T) -> impl Fn(&TriangleMesh) -> Loop<T>
 where
-    T: Clone,
+    T: Fn([Vec3; 3], &Ray) -> Tested + Clone,
 {
     move |mesh| Loop {
         mesh: mesh.clone(),
