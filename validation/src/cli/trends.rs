@@ -23,7 +23,7 @@ use super::{Verdict, random::keep_to_one_core, trees::default_data};
 Builders are compared without layout (rtcBuildBVH beside our hierarchy); trace time and counts of work are those of
 our kernels over either tree, Embree's being made once more by our builder and believed only if it is Embree's to the
 last bit. The flags dynamics, leaf_format and accuracy compare our whole trees with Embree's scenes, each traced by
-its own kernels. One thread, one core.
+its own kernels. One thread, one core; on Linux, times are what the process works, whatever else runs.
 
 A direction is the sign of Spearman's rank correlation within rounds; it is flat if the interval of 95 % over rounds
 holds 0. Files in DIR: measurements.csv (one line for each measurement), trends.csv (the table), trends.html.

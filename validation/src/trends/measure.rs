@@ -1,9 +1,10 @@
 //! Measures one sweep of one scene: both engines in turn, value by value, round by round.
 //!
 //! Values come in a new order in each round, and the engines take turns at being first, so that neither what the
-//! machine does meanwhile nor what the caches hold favours one of them. The first round is not counted.
+//! machine does meanwhile nor what the caches hold favours one of them. The first round is not counted. Times are those
+//! that the process works, where the system tells them (Linux); both engines are to work with one thread.
 
-use std::{cell::RefCell, collections::HashMap, hint::black_box, time::Instant};
+use std::{cell::RefCell, collections::HashMap, hint::black_box, time::Duration};
 
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -89,9 +90,9 @@ impl Subject {
     }
 
     fn trace(&self, is_hit: impl Fn(&Ray) -> bool) -> f64 {
-        let start = Instant::now();
+        let start = work_time();
         let hits = self.rays.iter().filter(|ray| is_hit(ray)).count();
-        let time = start.elapsed().as_secs_f64();
+        let time = work_time().saturating_sub(start).as_secs_f64();
         black_box(hits);
         1e9 * time / self.rays.len() as f64
     }
@@ -285,14 +286,14 @@ impl Value {
         let mut measured = self.fixed[engine].clone();
         match (&self.ours, engine) {
             (Some(_), 0) => {
-                let start = Instant::now();
+                let start = work_time();
                 black_box(subject.hierarchy(&self.params)?);
                 measured.push(build_time(start));
             }
             (Some(_), _) => {
                 let arguments = arguments(&self.params, subject.triangles())?;
                 let corners = |reference| subject.set.corners(reference);
-                let start = Instant::now();
+                let start = work_time();
                 let built = device.build(&subject.primitives, Some(&corners), &arguments)?;
                 measured.push(build_time(start));
                 black_box(&built);
@@ -309,7 +310,7 @@ impl Value {
 
     fn measure_own_scene(&self, subject: &Subject) -> Result<Vec<Measured>, TrendsError> {
         let mut workspace = self.workspace.borrow_mut();
-        let start = Instant::now();
+        let start = work_time();
         let tree = Bvh::build_in(&[&subject.mesh], &self.params, &mut workspace)?;
         let mut measured = vec![build_time(start)];
         let time = subject.trace(|ray| tree.closest_hit(ray).is_some());
@@ -333,7 +334,7 @@ impl Value {
         };
         let prepared = device.scene(&[&subject.mesh], &settings)?;
         let before = device.bytes();
-        let start = Instant::now();
+        let start = work_time();
         let scene = prepared.commit()?;
         let mut measured = vec![build_time(start)];
         let memory = device.bytes().saturating_sub(before);
@@ -362,8 +363,24 @@ fn welded(triangles: &[[Vec3; 3]]) -> Result<TriangleMesh, MeshError> {
     TriangleMesh::new(vertices, triangles)
 }
 
-fn build_time(start: Instant) -> Measured {
-    (Quantity::BuildTime, 1e3 * start.elapsed().as_secs_f64())
+fn build_time(start: Duration) -> Measured {
+    let time = work_time().saturating_sub(start);
+    (Quantity::BuildTime, 1e3 * time.as_secs_f64())
+}
+
+/// What all threads of the process have worked, in seconds of a core: other processes do not count.
+#[cfg(target_os = "linux")]
+fn work_time() -> Duration {
+    use rustix::time::{ClockId, clock_gettime};
+
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+}
+
+/// The time of day, where the system has no such clock.
+#[cfg(not(target_os = "linux"))]
+fn work_time() -> Duration {
+    std::time::UNIX_EPOCH.elapsed().unwrap_or_default()
 }
 
 fn arguments(params: &BuildParams, count: usize) -> Result<BuildArguments, TrendsError> {

@@ -80,14 +80,14 @@ impl Quantity {
         }
     }
 
-    /// Its unit.
+    /// Its unit; empty for a number.
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
             Self::BuildTime => "ms",
             Self::TraceTime => "ns/ray",
             Self::NodesVisited | Self::BlocksTested => "1/ray",
-            Self::SahCost | Self::TreeNodes => "1",
+            Self::SahCost | Self::TreeNodes => "",
             Self::Memory => "bytes",
         }
     }

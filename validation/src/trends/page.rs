@@ -209,7 +209,7 @@ fn numbers(html: &mut String, trends: &[&Trend]) {
             }
             let _ = write!(
                 html,
-                "<tr><td>{}<td class=t>{}, {}<td class=t>{}",
+                "<tr><td>{}<td class=t>{} <span class=n>{}</span><td class=t>{}",
                 escaped(&trend.scene),
                 trend.quantity.name(),
                 trend.quantity.unit(),
