@@ -72,17 +72,18 @@ impl Node {
     }
 }
 
-/// Möller and Trumbore's test, without a division before the hit is sure.
-fn triangle([a, b, c]: [Vec3; 3], ray: &Ray) -> Option<(f32, [f32; 2])> {
-    let (e1, e2, from) = (b - a, c - a, ray.origin - a);
-    let (p, q) = (ray.direction.cross(e2), from.cross(e1));
-    let whole = e1.dot(p);
-    let [u, v] = [from.dot(p), ray.direction.dot(q)].map(|x| x * whole.signum());
-    if whole == 0.0 || u < 0.0 || v < 0.0 || u + v > whole.abs() {
-        return None;
-    }
-    let t = e2.dot(q) / whole;
-    (ray.t_min <= t && t <= ray.t_max).then(|| (t, [u, v].map(|x| x / whole.abs())))
+/// Möller and Trumbore's test in f64, by the normal, which is 0 where a triangle is none.
+fn triangle(corners: [Vec3; 3], ray: &Ray) -> Option<(f32, [f32; 2])> {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let (e1, e2, from) = (b - a, c - a, origin - a);
+    let (normal, across) = (e1.cross(e2), from.cross(direction));
+    let whole = -direction.dot(normal);
+    let [u, v] = [e2.dot(across) / whole, -e1.dot(across) / whole];
+    let t = (from.dot(normal) / whole) as f32;
+    // Comparisons are false where `whole` is 0.
+    let is_hit = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && ray.t_min <= t && t <= ray.t_max;
+    is_hit.then_some((t, [u as f32, v as f32]))
 }
 
 struct MedianTree {

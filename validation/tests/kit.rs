@@ -69,8 +69,11 @@ where
 fn found<A: Accelerator>(accuracy: Accuracy, build: impl Fn(&TriangleMesh) -> A) -> Finding {
     let counterexample = Trial::new(accuracy).run(build).expect_err("a fault");
     let triangles = counterexample.mesh.triangles().len();
-    assert!(triangles <= 3, "{counterexample}");
-    counterexample.fault.finding
+    let finding = counterexample.fault.finding;
+    // A surface that leaks is closed around the ray.
+    let most = if finding == Finding::Leak { 12 } else { 3 };
+    assert!(triangles <= most, "{counterexample}");
+    finding
 }
 
 #[test]

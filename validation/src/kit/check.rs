@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use raywright_bvh::{Accuracy, Ray, TriangleMesh};
+use raywright_bvh::{Accuracy, Ray, TriangleMesh, Vec3};
 
 use super::Accelerator;
 use crate::{
     exact,
-    hits::{Answer, Class, Judge},
+    hits::{Answer, Class, Evaluation, Judge, TriangleTestForm},
 };
 
 /// What is wrong with an answer.
@@ -117,17 +117,9 @@ impl<'m> Checker<'m> {
         is_wrong_too: impl Fn(Class) -> bool,
     ) -> Result<(), Fault> {
         let answer = accelerator.closest_hit(ray);
-        let finding = if answer.is_some_and(|answer| !self.exists(answer)) {
-            Some(Finding::NoSuchTriangle)
-        } else {
-            match self.judge.class(ray, answer, expected) {
-                Class::Bug => Some(Finding::Wrong),
-                Class::Leak if self.accuracy == Accuracy::Robust => Some(Finding::Leak),
-                class if is_wrong_too(class) => Some(Finding::Wrong),
-                _ if accelerator.any_hit(ray) != answer.is_some() => Some(Finding::AnyHit),
-                _ => None,
-            }
-        };
+        let finding = self
+            .finding(ray, answer, expected, is_wrong_too)
+            .or_else(|| (accelerator.any_hit(ray) != answer.is_some()).then_some(Finding::AnyHit));
         match finding {
             None => Ok(()),
             Some(finding) => Err(Fault {
@@ -139,9 +131,42 @@ impl<'m> Checker<'m> {
         }
     }
 
-    fn exists(&self, answer: Answer) -> bool {
-        let [geometry, primitive] = answer.ids.map(|id| id as usize);
-        let mesh = self.meshes.get(geometry);
-        mesh.is_some_and(|mesh| primitive < mesh.triangles().len())
+    /// What is wrong with a closest hit.
+    fn finding(
+        &self,
+        ray: &Ray,
+        answer: Option<Answer>,
+        expected: Option<Answer>,
+        is_wrong_too: impl Fn(Class) -> bool,
+    ) -> Option<Finding> {
+        if let Some(answer) = answer {
+            let Some(corners) = self.corners(answer) else {
+                return Some(Finding::NoSuchTriangle);
+            };
+            if !(ray.t_min <= answer.t && answer.t <= ray.t_max) {
+                return Some(Finding::Wrong);
+            }
+            let form = match self.accuracy {
+                Accuracy::Fast => TriangleTestForm::MollerTrumbore,
+                Accuracy::Robust => TriangleTestForm::Sheared,
+            };
+            // The numbers of such a triangle may be anything: only our test keeps them to its box.
+            if Evaluation::new(corners, ray, form).is_ill_conditioned {
+                return None;
+            }
+        }
+        match self.judge.class(ray, answer, expected) {
+            Class::Bug => Some(Finding::Wrong),
+            Class::Leak if self.accuracy == Accuracy::Robust => Some(Finding::Leak),
+            class if is_wrong_too(class) => Some(Finding::Wrong),
+            _ => None,
+        }
+    }
+
+    fn corners(&self, answer: Answer) -> Option<[Vec3; 3]> {
+        let [geometry, primitive] = answer.ids;
+        let mesh = self.meshes.get(geometry as usize)?;
+        let exists = (primitive as usize) < mesh.triangles().len();
+        exists.then(|| mesh.corners(primitive))
     }
 }
