@@ -24,6 +24,7 @@
 mod correlation;
 mod measure;
 mod page;
+mod subject;
 mod sweep;
 
 use raywright_bvh::BuildError;
@@ -31,8 +32,9 @@ use raywright_bvh::BuildError;
 use crate::embree::EmbreeError;
 
 pub use correlation::{Agreement, Correlation, spearman};
-pub use measure::{Subject, Swept, sweep};
+pub use measure::{Swept, sweep};
 pub use page::page;
+pub use subject::Subject;
 pub use sweep::{SWEEPS, Sweep};
 
 /// What is measured.
