@@ -29,9 +29,13 @@ pub mod exact;
 pub mod golden;
 #[cfg(feature = "golden")]
 pub mod hits;
+#[cfg(feature = "kit")]
+pub mod kit;
 #[cfg(all(feature = "embree", feature = "golden"))]
 pub mod random;
 pub mod tree;
+#[cfg(feature = "trends")]
+pub mod trends;
 mod triangles;
 pub mod z_test;
 

@@ -5,6 +5,7 @@ mod random;
 mod rebuilds;
 mod table;
 mod trees;
+mod trends;
 
 use clap::{Parser, Subcommand};
 
@@ -27,6 +28,8 @@ enum Command {
     Hits(hits::HitsArgs),
     /// Build a scene again and again, and see whether memory grows
     Rebuilds(rebuilds::RebuildsArgs),
+    /// Measure whether each parameter pushes ours where it pushes Embree's
+    Trends(trends::TrendsArgs),
 }
 
 /// What a comparison found. Memory that grows is a difference too.
@@ -42,5 +45,6 @@ pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
         Command::Trees(args) => trees::run(&args),
         Command::Hits(args) => hits::run(&args),
         Command::Rebuilds(args) => rebuilds::run(&args),
+        Command::Trends(args) => trends::run(&args),
     }
 }

@@ -84,7 +84,7 @@ pub(super) fn run(builds: u64, seed: u64, scenes: &Path) -> Result<Verdict, Box<
 
 /// Whether it could be done. Threads that are started later inherit it.
 #[cfg(target_os = "linux")]
-fn keep_to_one_core() -> bool {
+pub(super) fn keep_to_one_core() -> bool {
     use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
     let Ok(allowed) = sched_getaffinity(None) else {
@@ -99,6 +99,6 @@ fn keep_to_one_core() -> bool {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn keep_to_one_core() -> bool {
+pub(super) fn keep_to_one_core() -> bool {
     false
 }

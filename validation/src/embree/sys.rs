@@ -14,9 +14,11 @@ mod build;
 mod scene;
 
 use std::{
+    ffi::c_void,
     marker::PhantomData,
     path::{Path, PathBuf},
     ptr,
+    sync::atomic::{AtomicIsize, Ordering},
 };
 
 use super::{EmbreeError, find};
@@ -84,9 +86,17 @@ impl Embree {
             let code = unsafe { (self.api.get_device_error)(ptr::null_mut()) };
             return Err(EmbreeError::Refused { code });
         }
+        let bytes = Box::new(AtomicIsize::new(0));
+        // SAFETY: the handle is not null; the number lives on the heap until after the device is released, and may be
+        // changed by many threads.
+        unsafe {
+            let user = ptr::from_ref(&*bytes).cast_mut().cast();
+            (self.api.set_memory_monitor)(handle, watch_memory, user);
+        }
         let device = Device {
             api: self.api,
             handle,
+            bytes,
             one_thread: PhantomData,
         };
         let version = device.version();
@@ -102,6 +112,8 @@ impl Embree {
 pub struct Device {
     api: &'static Api,
     handle: DeviceHandle,
+    /// What the library holds, told by itself.
+    bytes: Box<AtomicIsize>,
     /// Errors are kept per thread: a wrapper asks for them on the thread of its call.
     one_thread: PhantomData<*const ()>,
 }
@@ -132,6 +144,12 @@ impl Device {
         }
     }
 
+    /// Bytes that the library holds for trees, buffers and temporaries, as it tells its memory monitor.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.bytes.load(Ordering::Relaxed).max(0) as usize
+    }
+
     fn property(&self, property: i32) -> isize {
         // SAFETY: the handle is alive (2); an unknown property is answered by an error and 0.
         unsafe { (self.api.get_device_property)(self.handle, property) }
@@ -152,4 +170,11 @@ impl Drop for Device {
         // SAFETY: alive until here (2); whatever was made with it borrowed it and is gone.
         unsafe { (self.api.release_device)(self.handle) }
     }
+}
+
+extern "C" fn watch_memory(user: *mut c_void, bytes: isize, _are_there: bool) -> bool {
+    // SAFETY: `user` is the number of a device, which outlives the device.
+    let total = unsafe { &*user.cast::<AtomicIsize>() };
+    total.fetch_add(bytes, Ordering::Relaxed);
+    true
 }

@@ -33,6 +33,7 @@ pub use lines::{
 pub use obj::read_obj;
 pub use reciprocal::has_golden_reciprocal;
 pub use scene_level::{compare_scene_level, scene_level_parameters};
+#[cfg(feature = "embree")]
 pub(crate) use sets::families;
 pub use sets::{NAMES, procedural};
 

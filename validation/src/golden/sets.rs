@@ -173,6 +173,7 @@ fn mixed(seed: u32, n: usize) -> Vec<[Vec3; 3]> {
 
 /// Families of triangles with any number of them: the sets above, and what real scenes have beside
 /// (whole coordinates, duplicates, triangles without area).
+#[cfg(feature = "embree")]
 pub(crate) mod families {
     use super::*;
 

@@ -90,6 +90,9 @@ pub(super) type CreateLeaf =
 pub(super) type SplitPrimitive =
     extern "C" fn(*const Primitive, u32, f32, *mut Bounds, *mut Bounds, *mut c_void);
 
+/// User pointer, bytes (negative: given back), and whether they are already there; returns whether to go on.
+pub(super) type WatchMemory = extern "C" fn(*mut c_void, isize, bool) -> bool;
+
 /// `RTCBuildArguments`.
 #[derive(Debug)]
 #[repr(C)]
@@ -150,6 +153,7 @@ functions! {
     release_device = "rtcReleaseDevice": fn(DeviceHandle);
     get_device_error = "rtcGetDeviceError": fn(DeviceHandle) -> i32;
     get_device_property = "rtcGetDeviceProperty": fn(DeviceHandle, i32) -> isize;
+    set_memory_monitor = "rtcSetDeviceMemoryMonitorFunction": fn(DeviceHandle, WatchMemory, *mut c_void);
     new_bvh = "rtcNewBVH": fn(DeviceHandle) -> BvhHandle;
     build_bvh = "rtcBuildBVH": fn(*const Arguments) -> *mut c_void;
     thread_local_alloc = "rtcThreadLocalAlloc": fn(Allocator, usize, usize) -> *mut c_void;
