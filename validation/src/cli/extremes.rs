@@ -2,17 +2,13 @@
 
 use std::{
     error::Error,
-    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
-use raywright_bvh::{Accuracy, Isa, LeafFormat, TriangleMesh};
-use raywright_validation::{
-    extremes::{self, ABSENT, CLASSES, Class, ELSEWHERE, Findings, GOLDEN, Row, Settings},
-    golden,
-};
+use raywright_bvh::Isa;
+use raywright_validation::extremes::{CLASSES, Class, ELSEWHERE, Findings, GOLDEN, Settings};
 
 use super::{Verdict, trees::default_data};
 

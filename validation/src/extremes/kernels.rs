@@ -294,7 +294,7 @@ pub(super) fn twins(settings: &Settings, findings: &mut Findings) -> Result<(), 
             (0..count).map(|i| sample(&mut sampler, i, width)).unzip();
         twins.compare("random", &[&meshes::soup(&triangles)?], &rays, findings)?;
     }
-    for closed in meshes::closed()? {
+    for closed in settings.closed()? {
         for aim in [Aim::Edges, Aim::Vertices] {
             let rays = rays_from_inside(&closed, aim, count, &mut sampler);
             twins.compare(closed.name, &[&closed.mesh], &rays, findings)?;
@@ -315,7 +315,7 @@ pub(super) fn closure(settings: &Settings, findings: &mut Findings) -> Result<()
     let count = (settings.rays / SLOW_SHARE / RayKind::ALL.len()).max(4);
     let mut twins = Twins::default();
     let mut all: Vec<(String, TriangleMesh)> = Vec::new();
-    for closed in meshes::closed()? {
+    for closed in settings.closed()? {
         all.push((closed.name.to_owned(), closed.mesh));
     }
     for width in [1e-3, 1e-5, 1e-7] {

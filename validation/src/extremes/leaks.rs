@@ -103,7 +103,7 @@ fn cells(
     findings: &mut Findings,
 ) -> Result<(), ExtremesError> {
     let mut sampler = Sampler::new(seed);
-    for (mesh, closed) in meshes::closed()?.iter().enumerate() {
+    for (mesh, closed) in settings.closed()?.iter().enumerate() {
         for &(aim, embree) in aims {
             let rays = rays_from_inside(closed, aim, settings.rays, &mut sampler);
             for accuracy in ACCURACIES {

@@ -49,7 +49,7 @@ pub(super) fn scale(settings: &Settings, findings: &mut Findings) -> Result<(), 
     let count = (settings.rays / 40).max(10);
     let mut sampler = Sampler::new(11);
     let mut compared = 0;
-    for closed in meshes::closed()? {
+    for closed in settings.closed()? {
         let mesh = meshes::mapped(&closed.mesh, on_lattice)?;
         let closed = ClosedMesh { mesh, ..closed };
         let rays: Vec<Ray> = [Aim::Anywhere, Aim::Vertices]
@@ -239,17 +239,18 @@ pub(super) fn offset(settings: &Settings, findings: &mut Findings) -> Result<(),
     ];
     let offsets = [0.0, 1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
     let mut sampler = Sampler::new(12);
-    for (offset, embree) in offsets.into_iter().zip(embree) {
+    for (turn, (offset, embree)) in offsets.into_iter().zip(embree).enumerate() {
         let mut counts = [Vec::new(), Vec::new()];
         let mut excused = 0;
-        for closed in meshes::closed()? {
+        for closed in settings.closed()? {
             let mesh = meshes::mapped(&closed.mesh, |v| v + offset)?;
             let rays: Vec<Ray> = rays_from_inside(&closed, Aim::Anywhere, count, &mut sampler)
                 .into_iter()
                 .map(|ray| Ray::new(ray.origin + offset, ray.direction))
                 .collect();
             for accuracy in ACCURACIES {
-                let answers = ask_all(&[&mesh], accuracy, |tree| misses(tree, &rays))?;
+                let params = in_turn(accuracy, turn);
+                let answers = ask_each(&[&mesh], &params, |tree| misses(tree, &rays))?;
                 let lost = answers.iter().map(|&(count, _)| count).max().unwrap_or(0);
                 counts[accuracy as usize].push(lost);
                 findings
