@@ -11,7 +11,7 @@ use raywright_bvh::{
 
 use crate::{
     exact,
-    hits::{Answer, Class, Judge, TriangleTestForm},
+    hits::{Answer, Class, Evaluation, Judge, TriangleTestForm},
 };
 
 pub(super) const ACCURACIES: [Accuracy; 2] = [Accuracy::Fast, Accuracy::Robust];
@@ -178,7 +178,14 @@ impl Judged {
         let mut judged = Self::default();
         for (ray, &exact) in rays.iter().zip(exact) {
             let ours = tree.closest_hit(ray);
-            let class = judge.class(ray, ours.map(answer), exact);
+            let mut class = judge.class(ray, ours.map(answer), exact);
+            if class == Class::Leak && is_outline(meshes, ray) {
+                class = Class::SilhouetteTie;
+            }
+            if ours.is_none() && exact.is_some_and(|exact| is_at_end(meshes, ray, exact, accuracy))
+            {
+                class = Class::IntervalTie;
+            }
             judged.counts[class as usize] += 1;
             if is_fault(class, accuracy) && judged.first_fault.is_none() {
                 judged.first_fault = Some(format!(
@@ -209,6 +216,37 @@ impl std::fmt::Display for Judged {
             .collect();
         f.write_str(&present.join(", "))
     }
+}
+
+/// Whether an exact hit is so near to an end of the ray that our error of the distance reaches beyond: a tie.
+pub(super) fn is_at_end(
+    meshes: &[&TriangleMesh],
+    ray: &Ray,
+    exact: Answer,
+    accuracy: Accuracy,
+) -> bool {
+    let corners = meshes[exact.ids[0] as usize].corners(exact.ids[1]);
+    let evaluation = Evaluation::new(corners, ray, form(accuracy));
+    let is_near = |end: f32| (f64::from(end) - evaluation.t).abs() <= evaluation.t_bound;
+    is_near(ray.t_min) || is_near(ray.t_max)
+}
+
+/// Whether what a ray touches first has sides that face it and sides that face away: it passes an outline, be it at a
+/// vertex of which the edges of one triangle say nothing.
+fn is_outline(meshes: &[&TriangleMesh], ray: &Ray) -> bool {
+    let hits = exact::all_hits(meshes, ray);
+    let first = hits.first().map_or(0.0, |hit| hit.t);
+    let facing = hits
+        .iter()
+        .take_while(|hit| hit.t <= first * (1.0 + f64::EPSILON))
+        .map(|hit| {
+            let [a, b, c] = meshes[hit.geometry_id as usize]
+                .corners(hit.primitive_id)
+                .map(Vec3::as_dvec3);
+            (b - a).cross(c - a).dot(ray.direction.as_dvec3()) > 0.0
+        });
+    let facing: Vec<bool> = facing.collect();
+    facing.contains(&true) && facing.contains(&false)
 }
 
 fn is_fault(class: Class, accuracy: Accuracy) -> bool {
