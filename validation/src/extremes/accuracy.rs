@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use raywright_bvh::{Accuracy, BuildError, BuildParams, Bvh, LeafFormat, Ray, TriangleMesh};
 
 use super::{
-    kernels::percentiles,
+    errors::percentiles,
     leaks::{Aim, misses, rays_from_inside},
     meshes,
     modes::{Bits, Sampler, bits, exact_answer, form},

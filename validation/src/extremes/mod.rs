@@ -8,6 +8,8 @@
 //! Invariant: but for times, a report is a function of the settings and the machine's instruction sets.
 
 mod accuracy;
+mod cancel;
+mod errors;
 mod golden_rays;
 mod intervals;
 mod kernels;
@@ -185,7 +187,7 @@ const fn class(number: u32, title: &'static str, run: Run) -> Class {
 
 /// The classes that concern trees, builders and kernels.
 pub const CLASSES: [Class; 26] = [
-    class(1, "bounds of the kernels' errors", kernels::bounds),
+    class(1, "bounds of the kernels' errors", errors::bounds),
     class(2, "kernels equal the slow twin", kernels::twins),
     class(3, "leaks, random rays", leaks::random),
     class(4, "trees reject no hit", kernels::closure),
@@ -206,7 +208,7 @@ pub const CLASSES: [Class; 26] = [
     class(19, "coplanar overlap", overlaps::coplanar),
     class(21, "stack", trees::stack),
     class(22, "limits, memory", values::limits),
-    class(23, "cancellation, panic", running::cancel),
+    class(23, "cancellation, panic", cancel::cancel),
     class(24, "hostile calls", values::hostile),
     class(26, "determinism over threads", running::determinism),
     class(27, "concurrency", running::concurrency),
