@@ -315,10 +315,11 @@ pub(crate) fn hit_of(candidate: &Candidate, setup: &RaySetup, first_ids: &[u32])
         primitive_id,
     } = locate(first_ids, candidate.id);
     Hit {
-        // A ray that starts on a triangle meets it at 0 of either sign.
+        // A ray that starts on a triangle meets it at 0 of either sign, and one at an edge has a weight of 0 of either
+        // sign, by that of a zero in its direction.
         t: setup.unscaled(candidate.t) + 0.0,
-        u: candidate.u,
-        v: candidate.v,
+        u: candidate.u + 0.0,
+        v: candidate.v + 0.0,
         geometry_id,
         primitive_id,
     }

@@ -346,6 +346,34 @@ fn rays_that_can_hit_nothing() {
     }
 }
 
+/// At the corners and the middles of the edges of a square, where weights are 0.
+#[test]
+fn the_sign_of_a_zero_in_the_direction_changes_no_bit() {
+    let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+    let vertices = corners.map(|(x, y)| Vec3::new(x, y, 0.5)).to_vec();
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+    let mut hits = 0;
+    for tree in all_trees(&[&mesh]) {
+        for (x, y) in (0..9).map(|i| (0.5 * (i % 3) as f32, 0.5 * (i / 3) as f32)) {
+            let hit = |dx: f32, dy: f32| {
+                let ray = Ray::new([x, y, 0.0], [dx, dy, 1.0]);
+                bits(tree.closest_hit(&ray))
+            };
+            let expected = hit(0.0, 0.0);
+            hits += usize::from(expected.is_some());
+            for (dx, dy) in [(0.0, -0.0), (-0.0, 0.0), (-0.0, -0.0)] {
+                assert_eq!(
+                    hit(dx, dy),
+                    expected,
+                    "{x} {y} {dx} {dy} {:?}",
+                    tree.params()
+                );
+            }
+        }
+    }
+    assert!(hits > 0);
+}
+
 #[test]
 fn interval_ends_belong_to_the_interval() {
     let mesh = TriangleMesh::new(

@@ -6,6 +6,7 @@
 //! | [`z_test`] | do two pictures have the same mean? | statistics |
 //! | [`exact`] | where does a ray hit a triangle? | f64, integers for the sides of edges |
 //! | [`hits`] | is what two tracers say of a ray the same, a tie or a fault? | [`exact`] and bounds of errors |
+//! | [`extremes`] | does anything that breaks ray tracers break ours? | [`exact`], topology, a loop over all triangles |
 //! | [`golden`] | is a tree Embree's, to the last bit? | hashes of Embree's trees, in files |
 //! | [`embree`] | the same, for any input and parameters | the library itself, if it is there |
 //! | [`random`] | the same, over many | random triangles and parameters |
@@ -25,6 +26,8 @@
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod exact;
+#[cfg(feature = "extremes")]
+pub mod extremes;
 #[cfg(feature = "golden")]
 pub mod golden;
 #[cfg(feature = "golden")]

@@ -1,5 +1,7 @@
 //! Subcommands, one file each.
 
+mod accuracy;
+mod extremes;
 mod hits;
 mod random;
 mod rebuilds;
@@ -26,6 +28,10 @@ enum Command {
     Trees(trees::TreesArgs),
     /// Compare our hits with Embree's and with exact ones, and say what each difference is
     Hits(hits::HitsArgs),
+    /// Run the test classes of extremes, with Embree's figures beside
+    Extremes(extremes::ExtremesArgs),
+    /// Measure what robust hits and small leaves cost in speed, and what they are worth
+    Accuracy(accuracy::AccuracyArgs),
     /// Build a scene again and again, and see whether memory grows
     Rebuilds(rebuilds::RebuildsArgs),
     /// Measure whether each parameter pushes ours where it pushes Embree's
@@ -44,6 +50,8 @@ pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
     match cli.command {
         Command::Trees(args) => trees::run(&args),
         Command::Hits(args) => hits::run(&args),
+        Command::Extremes(args) => extremes::run(&args),
+        Command::Accuracy(args) => accuracy::run(&args),
         Command::Rebuilds(args) => rebuilds::run(&args),
         Command::Trends(args) => trends::run(&args),
     }

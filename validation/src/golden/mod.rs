@@ -12,6 +12,7 @@
 //! - lines marked `rcp` only on processors with the reciprocal estimate of the golden machine.
 
 mod cases;
+mod check;
 mod compare;
 mod figures;
 mod hash;
