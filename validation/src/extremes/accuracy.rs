@@ -16,10 +16,13 @@ use super::{
     errors::percentiles,
     leaks::{Aim, misses, rays_from_inside},
     meshes,
-    modes::{Bits, Sampler, bits, exact_answer, form},
+    modes::{Bits, Sampler, bits},
     thin::rays_at_strip,
 };
-use crate::hits::Evaluation;
+use crate::{
+    exact,
+    hits::{Evaluation, TriangleTestForm},
+};
 
 /// What the engine does not have, so that no row is about it.
 pub const ABSENT: [(&str, &str); 1] = [(
@@ -199,7 +202,9 @@ fn wrong_at_slivers(
     let tree = Bvh::build(&[&mesh], params)?;
     let rays = rays_at_strip(1e-7, false, count, sampler);
     let is_wrong = |ray: &&Ray| {
-        let exact = exact_answer(&[&mesh], ray).map(|answer| answer.ids[1]);
+        let exact = exact::all_hits(&[&mesh], ray)
+            .first()
+            .map(|hit| hit.primitive_id);
         tree.closest_hit(ray).map(|hit| hit.primitive_id) != exact
     };
     Ok(rays.par_iter().filter(is_wrong).count())
@@ -221,7 +226,11 @@ fn errors(
         let Some(hit) = tree.closest_hit(&ray) else {
             continue;
         };
-        let exact = Evaluation::new(mesh.corners(hit.primitive_id), &ray, form(params.accuracy));
+        let exact = Evaluation::new(
+            mesh.corners(hit.primitive_id),
+            &ray,
+            TriangleTestForm::of_ours(params.accuracy),
+        );
         if exact.is_met {
             errors[0].push((f64::from(hit.t) / exact.t - 1.0).abs());
             errors[1].push((f64::from(hit.u) - exact.uv[0]).abs());

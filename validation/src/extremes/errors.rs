@@ -4,9 +4,9 @@ use raywright_bvh::{Accuracy, BuildParams, BuildWorkspace, Bvh, Hit, Ray, Vec3};
 
 use super::{
     ExtremesError, Findings, Settings, meshes,
-    modes::{ACCURACIES, Sampler, bits, form, isas, label, name},
+    modes::{ACCURACIES, Sampler, bits, isas, label, name},
 };
-use crate::hits::Evaluation;
+use crate::hits::{Evaluation, TriangleTestForm};
 
 /// Rounding of f32, the unit of errors in reports.
 pub(super) const UNIT: f64 = 1.0 / (1 << 24) as f64;
@@ -67,9 +67,9 @@ struct Errors {
 
 impl Errors {
     fn add(&mut self, corners: [Vec3; 3], ray: &Ray, hit: Option<Hit>, accuracy: Accuracy) {
-        let exact = Evaluation::new(corners, ray, form(accuracy));
+        let exact = Evaluation::new(corners, ray, TriangleTestForm::of_ours(accuracy));
         // What lies behind, or just before it, is no hit of either.
-        if exact.t.is_nan() || exact.t <= exact.t_bound {
+        if exact.t.is_nan() || exact.t_range[0] <= 0.0 {
             return;
         }
         let ill = exact.is_ill_conditioned;
@@ -92,7 +92,9 @@ impl Errors {
                 } else {
                     self.false_hits += 1;
                 }
-                let off = t.abs() > exact.t_bound || u.abs().max(v.abs()) > exact.uv_bound;
+                let [from, to] = exact.t_range;
+                let t_is_off = !(from..=to).contains(&f64::from(hit.t));
+                let off = t_is_off || u.abs().max(v.abs()) > exact.uv_bound;
                 !ill && (off || exact.margin() < -1.0)
             }
         };

@@ -9,12 +9,12 @@ use super::{
     errors::{UNIT, sample},
     leaks::{Aim, rays_from_inside},
     meshes,
-    modes::{ACCURACIES, Sampler, ask_all, bits, cuts, form, label},
+    modes::{ACCURACIES, Sampler, ask_all, bits, cuts, label},
     overlaps,
 };
 use crate::{
     exact,
-    hits::{Evaluation, RayKind, Rays},
+    hits::{Evaluation, RayKind, Rays, TriangleTestForm},
 };
 
 /// Of so many rays one is compared with all triangles.
@@ -24,7 +24,7 @@ const SLOW_SHARE: usize = 20;
 /// its box, so that only hits in the triangle, at the right distance to two roundings of the margin, are promised.
 fn is_promised(meshes: &[&TriangleMesh], ray: &Ray, hit: Hit, accuracy: Accuracy) -> bool {
     let corners = meshes[hit.geometry_id as usize].corners(hit.primitive_id);
-    let evaluation = Evaluation::new(corners, ray, form(accuracy));
+    let evaluation = Evaluation::new(corners, ray, TriangleTestForm::of_ours(accuracy));
     let vertices = meshes.iter().flat_map(|mesh| mesh.vertices());
     let largest = vertices.fold(0f32, |largest, v| largest.max(v.abs().max_element()));
     let margin = (ray.origin.abs() + largest).as_dvec3() / ray.direction.abs().as_dvec3();

@@ -10,8 +10,8 @@ use raywright_bvh::{
 };
 
 use crate::{
-    exact,
-    hits::{Answer, Class, Evaluation, Judge, TriangleTestForm},
+    exact::{ExactHit, ExactTree},
+    hits::{Answer, Class, Judge},
 };
 
 pub(super) const ACCURACIES: [Accuracy; 2] = [Accuracy::Fast, Accuracy::Robust];
@@ -132,14 +132,6 @@ pub(super) fn cuts(quality: Quality) -> bool {
     matches!(quality, Quality::SpatialSplits | Quality::Optimized)
 }
 
-/// The triangle test of ours.
-pub(super) fn form(accuracy: Accuracy) -> TriangleTestForm {
-    match accuracy {
-        Accuracy::Fast => TriangleTestForm::MollerTrumbore,
-        Accuracy::Robust => TriangleTestForm::Sheared,
-    }
-}
-
 pub(super) fn answer(hit: Hit) -> Answer {
     Answer {
         t: hit.t,
@@ -148,14 +140,13 @@ pub(super) fn answer(hit: Hit) -> Answer {
     }
 }
 
-/// The nearest exact hit.
-pub(super) fn exact_answer(meshes: &[&TriangleMesh], ray: &Ray) -> Option<Answer> {
-    let hits = exact::all_hits(meshes, ray);
-    hits.first().map(|hit| Answer {
-        t: hit.t as f32,
-        uv: hit.uv.map(|x| x as f32),
-        ids: [hit.geometry_id, hit.primitive_id],
-    })
+/// All exact hits of each ray, the closest first.
+pub(super) fn exact_hits(meshes: &[&TriangleMesh], rays: &[Ray]) -> Vec<Vec<ExactHit>> {
+    let tree = ExactTree::new(meshes);
+    let hits = rays
+        .par_iter()
+        .map(|ray| tree.hits_until(ray, f64::INFINITY));
+    hits.collect()
 }
 
 /// How many rays are of each class beside exact hits.
@@ -170,28 +161,24 @@ impl Judged {
     pub(super) fn new(
         meshes: &[&TriangleMesh],
         rays: &[Ray],
-        exact: &[Option<Answer>],
+        exact: &[Vec<ExactHit>],
         accuracy: Accuracy,
     ) -> Result<Self, BuildError> {
         let tree = Bvh::build(meshes, &with(Quality::BinnedSah, 8, accuracy))?;
         let judge = Judge::new(meshes, accuracy);
         let mut judged = Self::default();
-        for (ray, &exact) in rays.iter().zip(exact) {
+        for (ray, exact) in rays.iter().zip(exact) {
             let ours = tree.closest_hit(ray);
-            let mut class = judge.class(ray, ours.map(answer), exact);
-            if class == Class::Leak && is_outline(meshes, ray) {
-                class = Class::SilhouetteTie;
-            }
-            if ours.is_none() && exact.is_some_and(|exact| is_at_end(meshes, ray, exact, accuracy))
-            {
-                class = Class::IntervalTie;
-            }
+            let farthest = judge.farthest(ray, ours.map(answer));
+            let near = exact.partition_point(|hit| hit.t <= farthest);
+            let class = judge.class_beside_all(ray, ours.map(answer), &exact[..near]);
             judged.counts[class as usize] += 1;
             if is_fault(class, accuracy) && judged.first_fault.is_none() {
                 judged.first_fault = Some(format!(
-                    "{} {}: {ray:?}, ours {ours:?}, exact {exact:?}",
+                    "{} {}: {ray:?}, ours {ours:?}, exact {:?}",
                     name(accuracy),
-                    class.name()
+                    class.name(),
+                    exact.first()
                 ));
             }
         }
@@ -216,37 +203,6 @@ impl std::fmt::Display for Judged {
             .collect();
         f.write_str(&present.join(", "))
     }
-}
-
-/// Whether an exact hit is so near to an end of the ray that our error of the distance reaches beyond: a tie.
-pub(super) fn is_at_end(
-    meshes: &[&TriangleMesh],
-    ray: &Ray,
-    exact: Answer,
-    accuracy: Accuracy,
-) -> bool {
-    let corners = meshes[exact.ids[0] as usize].corners(exact.ids[1]);
-    let evaluation = Evaluation::new(corners, ray, form(accuracy));
-    let is_near = |end: f32| (f64::from(end) - evaluation.t).abs() <= evaluation.t_bound;
-    is_near(ray.t_min) || is_near(ray.t_max)
-}
-
-/// Whether what a ray touches first has sides that face it and sides that face away: it passes an outline, be it at a
-/// vertex of which the edges of one triangle say nothing.
-fn is_outline(meshes: &[&TriangleMesh], ray: &Ray) -> bool {
-    let hits = exact::all_hits(meshes, ray);
-    let first = hits.first().map_or(0.0, |hit| hit.t);
-    let facing = hits
-        .iter()
-        .take_while(|hit| hit.t <= first * (1.0 + f64::EPSILON))
-        .map(|hit| {
-            let [a, b, c] = meshes[hit.geometry_id as usize]
-                .corners(hit.primitive_id)
-                .map(Vec3::as_dvec3);
-            (b - a).cross(c - a).dot(ray.direction.as_dvec3()) > 0.0
-        });
-    let facing: Vec<bool> = facing.collect();
-    facing.contains(&true) && facing.contains(&false)
 }
 
 fn is_fault(class: Class, accuracy: Accuracy) -> bool {

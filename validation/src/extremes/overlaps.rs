@@ -6,7 +6,7 @@ use raywright_bvh::{MeshError, Ray, TriangleMesh, Vec3};
 
 use super::{
     ExtremesError, Findings, Settings, meshes,
-    modes::{ACCURACIES, Judged, Sampler, ask_all, bits, exact_answer, name},
+    modes::{ACCURACIES, Judged, Sampler, ask_all, bits, exact_hits, name},
 };
 
 /// 8 × 8 and 32 × 32 squares in one slanted plane, but for the rounding of vertices.
@@ -55,10 +55,7 @@ pub(super) fn coplanar(settings: &Settings, findings: &mut Findings) -> Result<(
         ),
         ("planes 1 ulp apart", [&near, &far], &at_layers, ["", ""]),
     ] {
-        let exact: Vec<_> = rays
-            .par_iter()
-            .map(|ray| exact_answer(&scene, ray))
-            .collect();
+        let exact = exact_hits(&scene, rays);
         for accuracy in ACCURACIES {
             let judged = Judged::new(&scene, rays, &exact, accuracy)?;
             findings.faults.extend(judged.first_fault().cloned());

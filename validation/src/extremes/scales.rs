@@ -8,7 +8,7 @@ use super::{
     leaks::{Aim, misses, rays_from_inside},
     meshes::{self, ClosedMesh},
     modes::{
-        ACCURACIES, Judged, Sampler, answer, ask_all, ask_each, bits, exact_answer, in_turn, label,
+        ACCURACIES, Judged, Sampler, answer, ask_all, ask_each, bits, exact_hits, in_turn, label,
         name,
     },
 };
@@ -336,10 +336,7 @@ pub(super) fn mixed(settings: &Settings, findings: &mut Findings) -> Result<(), 
         ("dust first", [&dust, &sphere]),
         ("sphere first", [&sphere, &dust]),
     ] {
-        let exact: Vec<_> = rays
-            .par_iter()
-            .map(|ray| exact_answer(&scene, ray))
-            .collect();
+        let exact = exact_hits(&scene, &rays);
         for accuracy in ACCURACIES {
             let judged = Judged::new(&scene, &rays, &exact, accuracy)?;
             findings.faults.extend(judged.first_fault().cloned());

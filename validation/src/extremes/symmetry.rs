@@ -8,7 +8,7 @@ use super::{
     ExtremesError, Findings, Settings,
     leaks::misses,
     meshes,
-    modes::{ACCURACIES, Judged, Sampler, ask_all, bits, exact_answer, name},
+    modes::{ACCURACIES, Judged, Sampler, ask_all, bits, exact_hits, name},
 };
 
 /// A cube −1..1 with n × n squares per face.
@@ -48,10 +48,7 @@ pub(super) fn solids(settings: &Settings, findings: &mut Findings) -> Result<(),
             .filter(|ray| ray.direction != Vec3::ZERO)
             .collect();
         rays_asked += rays.len();
-        let exact: Vec<_> = rays
-            .par_iter()
-            .map(|ray| exact_answer(&scene, ray))
-            .collect();
+        let exact = exact_hits(&scene, &rays);
         for accuracy in ACCURACIES {
             let judged = Judged::new(&scene, &rays, &exact, accuracy)?;
             findings.faults.extend(judged.first_fault().cloned());

@@ -33,6 +33,17 @@ pub enum TriangleTestForm {
     Sheared,
 }
 
+impl TriangleTestForm {
+    /// That of our test of an accuracy.
+    #[must_use]
+    pub fn of_ours(accuracy: Accuracy) -> Self {
+        match accuracy {
+            Accuracy::Fast => Self::MollerTrumbore,
+            Accuracy::Robust => Self::Sheared,
+        }
+    }
+}
+
 /// A triangle seen along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -66,11 +77,7 @@ impl Evaluation {
         accuracy: Accuracy,
         coordinate_bound: f64,
     ) -> Self {
-        let form = match accuracy {
-            Accuracy::Fast => TriangleTestForm::MollerTrumbore,
-            Accuracy::Robust => TriangleTestForm::Sheared,
-        };
-        let free = Self::new(corners, ray, form);
+        let free = Self::new(corners, ray, TriangleTestForm::of_ours(accuracy));
         Self {
             t_range: clamped(free.t_range, corners, ray, accuracy, coordinate_bound),
             ..free

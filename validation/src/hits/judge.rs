@@ -21,8 +21,8 @@ use crate::exact::ExactHit;
 pub struct Judge<'m> {
     meshes: &'m [&'m TriangleMesh],
     accuracy: Accuracy,
-    /// The power of two above the largest coordinate.
-    coordinate_bound: f64,
+    /// The power of two above the largest coordinate, if distances are kept to boxes of triangles.
+    coordinate_bound: Option<f64>,
     /// Triangles at each edge.
     neighbours: HashMap<EdgeKey, Vec<[u32; 2]>>,
 }
@@ -53,9 +53,17 @@ impl<'m> Judge<'m> {
         Self {
             meshes,
             accuracy,
-            coordinate_bound: 2.0 * power_of_two_below(largest),
+            coordinate_bound: Some(2.0 * power_of_two_below(largest)),
             neighbours,
         }
+    }
+
+    /// The same for a tracer with tests of the same form that leaves distances as they are, where ours keeps them
+    /// to the boxes of triangles.
+    #[must_use]
+    pub fn of_free_distances(mut self) -> Self {
+        self.coordinate_bound = None;
+        self
     }
 
     fn corners(&self, [geometry, primitive]: [u32; 2]) -> [Vec3; 3] {
@@ -63,7 +71,11 @@ impl<'m> Judge<'m> {
     }
 
     fn by_ours(&self, ids: [u32; 2], ray: &Ray) -> Evaluation {
-        Evaluation::of_ours(self.corners(ids), ray, self.accuracy, self.coordinate_bound)
+        let corners = self.corners(ids);
+        match self.coordinate_bound {
+            Some(bound) => Evaluation::of_ours(corners, ray, self.accuracy, bound),
+            None => Evaluation::new(corners, ray, TriangleTestForm::of_ours(self.accuracy)),
+        }
     }
 
     /// Up to where exact hits tell anything of our answer.

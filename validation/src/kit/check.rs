@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use raywright_bvh::{Accuracy, Ray, TriangleMesh, Vec3};
+use raywright_bvh::{Accuracy, Ray, TriangleMesh};
 
 use super::Accelerator;
 use crate::{
     exact,
-    hits::{Answer, Class, Evaluation, Judge, TriangleTestForm},
+    hits::{Answer, Class, Judge},
 };
 
 /// What is wrong with an answer.
@@ -75,7 +75,7 @@ impl<'m> Checker<'m> {
         Self {
             meshes,
             accuracy,
-            judge: Judge::new(meshes, accuracy),
+            judge: Judge::new(meshes, accuracy).of_free_distances(),
         }
     }
 
@@ -84,14 +84,16 @@ impl<'m> Checker<'m> {
     /// # Errors
     /// The fault.
     pub fn beside_exact(&self, accelerator: &impl Accelerator, ray: &Ray) -> Result<(), Fault> {
-        let expected = exact::all_hits(self.meshes, ray).first().map(|hit| Answer {
+        let hits = exact::all_hits(self.meshes, ray);
+        let expected = hits.first().map(|hit| Answer {
             t: hit.t as f32,
             uv: hit.uv.map(|x| x as f32),
             ids: [hit.geometry_id, hit.primitive_id],
         });
-        self.check(accelerator, ray, expected, |class| {
-            // Exact hits neither miss nor invent.
-            matches!(class, Class::OtherMisses | Class::OtherInvents)
+        self.check(accelerator, ray, expected, |answer| {
+            let farthest = self.judge.farthest(ray, answer);
+            let near = hits.partition_point(|hit| hit.t <= farthest);
+            self.judge.class_beside_all(ray, answer, &hits[..near])
         })
     }
 
@@ -106,7 +108,10 @@ impl<'m> Checker<'m> {
         peer: &impl Accelerator,
         ray: &Ray,
     ) -> Result<(), Fault> {
-        self.check(accelerator, ray, peer.closest_hit(ray), |_| false)
+        let expected = peer.closest_hit(ray);
+        self.check(accelerator, ray, expected, |answer| {
+            self.judge.class(ray, answer, expected)
+        })
     }
 
     fn check(
@@ -114,11 +119,11 @@ impl<'m> Checker<'m> {
         accelerator: &impl Accelerator,
         ray: &Ray,
         expected: Option<Answer>,
-        is_wrong_too: impl Fn(Class) -> bool,
+        class: impl Fn(Option<Answer>) -> Class,
     ) -> Result<(), Fault> {
         let answer = accelerator.closest_hit(ray);
         let finding = self
-            .finding(ray, answer, expected, is_wrong_too)
+            .finding(ray, answer, class)
             .or_else(|| (accelerator.any_hit(ray) != answer.is_some()).then_some(Finding::AnyHit));
         match finding {
             None => Ok(()),
@@ -136,37 +141,25 @@ impl<'m> Checker<'m> {
         &self,
         ray: &Ray,
         answer: Option<Answer>,
-        expected: Option<Answer>,
-        is_wrong_too: impl Fn(Class) -> bool,
+        class: impl Fn(Option<Answer>) -> Class,
     ) -> Option<Finding> {
         if let Some(answer) = answer {
-            let Some(corners) = self.corners(answer) else {
+            if !self.has_triangle(answer.ids) {
                 return Some(Finding::NoSuchTriangle);
-            };
+            }
             if !(ray.t_min <= answer.t && answer.t <= ray.t_max) {
                 return Some(Finding::Wrong);
             }
-            let form = match self.accuracy {
-                Accuracy::Fast => TriangleTestForm::MollerTrumbore,
-                Accuracy::Robust => TriangleTestForm::Sheared,
-            };
-            // The numbers of such a triangle may be anything: only our test keeps them to its box.
-            if Evaluation::new(corners, ray, form).is_ill_conditioned {
-                return None;
-            }
         }
-        match self.judge.class(ray, answer, expected) {
+        match class(answer) {
             Class::Bug => Some(Finding::Wrong),
             Class::Leak if self.accuracy == Accuracy::Robust => Some(Finding::Leak),
-            class if is_wrong_too(class) => Some(Finding::Wrong),
             _ => None,
         }
     }
 
-    fn corners(&self, answer: Answer) -> Option<[Vec3; 3]> {
-        let [geometry, primitive] = answer.ids;
-        let mesh = self.meshes.get(geometry as usize)?;
-        let exists = (primitive as usize) < mesh.triangles().len();
-        exists.then(|| mesh.corners(primitive))
+    fn has_triangle(&self, [geometry, primitive]: [u32; 2]) -> bool {
+        let mesh = self.meshes.get(geometry as usize);
+        mesh.is_some_and(|mesh| (primitive as usize) < mesh.triangles().len())
     }
 }
