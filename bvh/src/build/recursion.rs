@@ -367,8 +367,22 @@ struct Builder<'a, R, C> {
 }
 
 impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
-    fn find_split(&self, of: &Subtree<'_>, span: &Span, memory: &mut Memory) -> Option<Split> {
+    /// Whether to go on, if the range is long.
+    fn check(&self, n: usize) -> Result<(), BuildError> {
+        if n >= CHECK_SIZE {
+            self.running.check()?;
+        }
+        Ok(())
+    }
+
+    fn find_split(
+        &self,
+        of: &Subtree<'_>,
+        span: &Span,
+        memory: &mut Memory,
+    ) -> Result<Option<Split>, BuildError> {
         let (references, bounds) = (of.references(span), &span.bounds);
+        self.check(span.len)?;
         let room = span.capacity - span.len;
         let object = binning::find_split::<R>(
             references,
@@ -378,21 +392,17 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             &mut memory.bins,
         );
         let Some(cutting) = self.cutting.as_ref().filter(|_| room > 0) else {
-            return object.map(Split::Object);
-        };
-        let (object_sah, overlap) = match &object {
-            Some(split) => (split.sah, split.sides[0].intersection(&split.sides[1])),
-            None => (f32::INFINITY, Bounds::EMPTY),
+            return Ok(object.map(Split::Object));
         };
         let spatial = cutting.find_split::<R>(
             references,
             room,
             bounds,
-            object_sah,
-            &overlap,
+            object.as_ref(),
             &mut memory.spatial_bins,
-        );
-        spatial.map(Split::Spatial).or(object.map(Split::Object))
+            &self.running,
+        )?;
+        Ok(spatial.map(Split::Spatial).or(object.map(Split::Object)))
     }
 
     /// Divides a span by a plane, or halves it in sorted order if there is none.
@@ -459,9 +469,6 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         level: u32,
     ) -> Result<Record, BuildError> {
         let (n, span) = (subtree.len, subtree.span());
-        if n >= CHECK_SIZE {
-            self.running.check()?;
-        }
         let (min_leaf_size, max_leaf_size) = (
             self.params.min_leaf_size as usize,
             self.params.max_leaf_size as usize,
@@ -470,7 +477,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
             subtree.sort::<R>(&span);
             return self.leaf_phase(subtree, memory, level);
         }
-        let split = self.find_split(&subtree, &span, memory);
+        let split = self.find_split(&subtree, &span, memory)?;
         if n <= max_leaf_size && self.leaf_is_cheap(&subtree, split.as_ref()) {
             subtree.sort::<R>(&span);
             return self.leaf_phase(subtree, memory, level);
@@ -488,7 +495,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
                 break;
             };
             let child = memory.lists.children[largest];
-            let split = self.find_split(&subtree, &child, memory);
+            let split = self.find_split(&subtree, &child, memory)?;
             let [left, right] = self.divide(&mut subtree, child, split, &mut memory.lists.lefts);
             memory.lists.children[largest] = left;
             memory.lists.children.push(right);

@@ -11,13 +11,17 @@ use wide::{f32x4, f32x8};
 
 use super::{
     LeafReference,
-    binning::Rounding,
+    binning::{self, Rounding},
+    control::Running,
     primitive::{Bounds, BoxLanes, PrimitiveRef, RangeBounds},
     tasks,
 };
-use crate::simd::{
-    self, Isa,
-    build::{EightLanes, Halves},
+use crate::{
+    error::BuildError,
+    simd::{
+        self, Isa,
+        build::{EightLanes, Halves},
+    },
 };
 
 /// Bins of spatial splits.
@@ -164,22 +168,29 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         }
     }
 
-    /// The cheapest plane that cuts, if it is worth it: the sides of the best object split overlap
-    /// (`overlap`), cutting is cheaper than that split, and there is room for the new references.
+    /// The cheapest plane that cuts, if it is worth it: the sides of the best object split overlap,
+    /// cutting is cheaper than that split, and there is room for the new references. Where cuts
+    /// would be takes long to find, so that each piece asks whether to go on.
+    ///
+    /// # Errors
+    /// If the build is cancelled.
     pub(crate) fn find_split<R: Rounding>(
         &self,
         references: &[PrimitiveRef],
         room: usize,
         bounds: &RangeBounds,
-        object_sah: f32,
-        overlap: &Bounds,
+        object: Option<&binning::Split>,
         bins: &mut Bins,
-    ) -> Option<SpatialSplit> {
-        let overlap_area = area(overlap);
+        running: &Running<'_>,
+    ) -> Result<Option<SpatialSplit>, BuildError> {
+        let (object_sah, overlap) = object.map_or((f32::INFINITY, Bounds::EMPTY), |split| {
+            (split.sah, split.sides[0].intersection(&split.sides[1]))
+        });
+        let overlap_area = area(&overlap);
         if !(overlap_area >= ROOT_OVERLAP * self.root_area
             && overlap_area >= OVERLAP * area(&bounds.geometry))
         {
-            return None;
+            return Ok(None);
         }
         let mapping = Mapping::new(&bounds.geometry);
         let fill = |references: &[PrimitiveRef], bins: &mut Bins| {
@@ -195,13 +206,21 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         if tasks::in_pieces(references.len()) {
             let of_piece = |piece: &[PrimitiveRef]| {
                 let mut bins = Bins::default();
-                fill(piece, &mut bins);
+                if running.check().is_ok() {
+                    fill(piece, &mut bins);
+                }
                 bins
             };
             *bins = tasks::map_merge(references, &of_piece, &|a: Bins, b| a.merge(&b));
+            running.check()?;
         } else {
             *bins = Bins::default();
-            fill(references, bins);
+            for piece in references.chunks(tasks::PIECE_SIZE) {
+                if references.len() > tasks::PIECE_SIZE {
+                    running.check()?;
+                }
+                fill(piece, bins);
+            }
         }
         let scale = mapping.scale.to_array();
         let mut best: Option<SpatialSplit> = None;
@@ -217,11 +236,11 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
                 });
             }
         }
-        best.filter(|split| {
+        Ok(best.filter(|split| {
             // As in Embree the difference wraps round: a count below that of the range (parts
             // can be lost to rounding) is no room.
             split.sah < GAIN * object_sah && split.count.wrapping_sub(references.len()) <= room
-        })
+        }))
     }
 
     #[inline(always)]
