@@ -36,7 +36,7 @@ use raywright_tuner::{ChangeDetector, Config, Outcome, Reason, Search, Trial, Tu
 
 use super::{
     comparison::Comparison,
-    probe::ProbeRatio,
+    probe::{INTERRUPTED, ProbeRatio},
     space::ParameterSpace,
     stage::{Clock, SessionError, Settings, Stage, add_frame},
 };
@@ -288,9 +288,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             self.learn_whole(render);
         } else if !is_beside {
             // Frames beside which something is built tell nothing of the others.
-            if candidate.is_none() {
-                self.learn_sharing(render, &frame.times, FRESH);
-            }
+            self.learn_sharing(render, frame.work, candidate.is_some());
             self.watch(&frame.times);
         }
         add_frame(&mut self.film, &frame.film);
@@ -302,8 +300,10 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         } else {
             0.0
         };
+        let usual = self.incumbent_cost().unwrap_or(0.0);
         let saved = self.saved_by_frame();
-        self.budget.add_frame(time.as_secs_f64(), lost, saved);
+        self.budget
+            .add_frame(time.as_secs_f64(), usual, lost, saved);
         Ok(Some(HybridFrame {
             candidate,
             time,
@@ -325,7 +325,12 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let starts: Vec<Config> = starts.collect::<Result<_, _>>()?;
         let trial = self.tuner.ask_for(&config);
         start += self.time_of(|| begins(&trial));
-        let (tree, build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
+        let (mut tree, mut build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
+        if !self.is_frozen && self.stage.settings.metric.build_share() > 0.0 {
+            // The first to touch its memory takes up to four times as long as those after it.
+            self.stage.recycle(tree);
+            (tree, build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
+        }
         self.trace_rest(&mut frame, &tree)?;
         if !frame.is_done() {
             self.stage.recycle(tree);
@@ -337,9 +342,13 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             self.tiles[tile] = time;
         }
         let render = (self.stage.now() - start).saturating_sub(build);
-        self.learn_sharing(render, &frame.times, 1.0);
         if self.is_frozen {
             self.learn_whole(render);
+        } else {
+            let share = render.as_secs_f64() / frame.work;
+            if share > 0.0 && share.is_finite() {
+                self.wall_per_work = share;
+            }
         }
         let config = trial.canonical.clone();
         let incumbent = Incumbent::first(config, self.first, tree, build.as_secs_f64());
@@ -354,8 +363,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.spare = Some(frame.film);
         self.finished += 1;
         let time = self.stage.now() - start;
-        self.budget.begin(self.unit);
-        self.budget.add_frame(time.as_secs_f64(), 0.0, 0.0);
+        self.budget.begin();
+        self.budget
+            .add_frame(time.as_secs_f64(), self.unit, 0.0, 0.0);
         Ok(Some(HybridFrame {
             candidate: None,
             time,
@@ -570,12 +580,14 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self.wall_per_work * self.tiles.iter().sum::<f64>()
     }
 
-    /// Learns from a frame of the incumbent alone how well threads share its work.
-    fn learn_sharing(&mut self, render: Duration, times: &[(usize, f64)], weight: f64) {
-        let work: f64 = times.iter().map(|(_, time)| time).sum();
+    /// Learns from a frame how well threads share its work. In the parts of a probe they wait for each other, so that a
+    /// frame with a candidate says at most that they share it better; and so it is with a frame that was interrupted.
+    fn learn_sharing(&mut self, render: Duration, work: f64, has_candidate: bool) {
         let share = render.as_secs_f64() / work;
-        if share > 0.0 && share.is_finite() {
-            self.wall_per_work += weight * (share - self.wall_per_work);
+        if share > 0.0 && share < self.wall_per_work {
+            self.wall_per_work = share;
+        } else if share < INTERRUPTED * self.wall_per_work && !has_candidate {
+            self.wall_per_work += FRESH * (share - self.wall_per_work);
         }
     }
 

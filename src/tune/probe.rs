@@ -9,8 +9,8 @@
 //! Ratio estimation and the jackknife over pairs: Cochran, *Sampling Techniques*, 1977, section 6. A probe
 //! goes on with twice as many tiles for as long as it has not decided, up to half of the frame.
 //!
-//! A tile that takes much longer than its like was interrupted by something else on the machine, and is taken
-//! for one that was not.
+//! A tile that takes much longer than its like was interrupted by something else on the machine, or much shorter
+//! because it was so when it was learned what to expect; either is taken for one that was not.
 //!
 //! Invariants: a ratio of times that are all multiplied by a number is the same; bounds lie on both sides of
 //! the ratio; no pairs decide nothing.
@@ -131,41 +131,39 @@ impl ProbeRatio {
     }
 }
 
-/// Pairs in which no tile took more than [`INTERRUPTED`] times what is usual on its side.
+/// Pairs without interruptions: a tile that took more than [`INTERRUPTED`] times what is usual on its side was
+/// interrupted now, and one that took less than that part of it when it was learned what to expect.
 fn without_interruptions(pairs: &[Pair]) -> Vec<Pair> {
-    let most = |side: fn(&Pair) -> [f64; 2]| {
+    let usual = |side: fn(&Pair) -> [f64; 2]| {
         let mut factors: Vec<f64> = pairs
             .iter()
             .map(|pair| side(pair)[0] / side(pair)[1])
             .collect();
         factors.sort_by(f64::total_cmp);
-        let median = factors.get(factors.len() / 2);
-        INTERRUPTED * median.copied().unwrap_or(f64::INFINITY)
+        factors.get(factors.len() / 2).copied().unwrap_or(f64::NAN)
     };
-    let [candidate, incumbent] = [most(|pair| pair.candidate), most(|pair| pair.incumbent)];
-    let least = |[time, expected]: [f64; 2], most: f64| {
-        // A NaN is kept.
-        let is_interrupted = time > most * expected;
-        [
-            if is_interrupted {
-                most * expected
-            } else {
-                time
-            },
-            expected,
-        ]
+    let [candidate, incumbent] = [usual(|pair| pair.candidate), usual(|pair| pair.incumbent)];
+    // A NaN is kept.
+    let mended = |[time, expected]: [f64; 2], usual: f64| {
+        if time > INTERRUPTED * usual * expected {
+            [INTERRUPTED * usual * expected, expected]
+        } else if INTERRUPTED * time < usual * expected {
+            [time, INTERRUPTED * time / usual]
+        } else {
+            [time, expected]
+        }
     };
     pairs
         .iter()
         .map(|pair| Pair {
-            candidate: least(pair.candidate, candidate),
-            incumbent: least(pair.incumbent, incumbent),
+            candidate: mended(pair.candidate, candidate),
+            incumbent: mended(pair.incumbent, incumbent),
         })
         .collect()
 }
 
-/// Standard deviation of the time of one build, as a share: 6 to 8 % for single builds on a shared machine.
-const BUILD_DEVIATION: f64 = 0.06;
+/// Standard deviation of the time of one build, as a share, at least: 6 to 8 % for single builds on a shared machine.
+pub(super) const BUILD_DEVIATION: f64 = 0.06;
 
 /// What is done with a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,6 +197,8 @@ pub struct Costs {
     pub incumbent_build: f64,
     /// The same of the candidate, measured once.
     pub candidate_build: f64,
+    /// The standard deviation of the time of one build, as a share of it.
+    pub build_deviation: f64,
 }
 
 impl Costs {
@@ -217,7 +217,7 @@ impl Costs {
 
     fn bounds_at(&self, ratio: ProbeRatio, quantile: f64) -> [f64; 3] {
         let [expected, lower, upper] = ratio.bounds_at(quantile).map(|bound| self.ratio(bound));
-        let build = quantile * BUILD_DEVIATION * self.candidate_build
+        let build = quantile * self.build_deviation * self.candidate_build
             / (self.incumbent_build + self.render);
         [
             expected,
@@ -294,6 +294,19 @@ pub(super) fn spread_order(tiles: usize, frame: u32) -> Vec<usize> {
         .collect()
 }
 
+/// The tile of a pair that is the candidate's in a frame, and that of the incumbent: by chance, so that no half of the
+/// tiles is the candidate's again and again.
+pub(super) fn turn([a, b]: [usize; 2], frame: u32) -> [usize; 2] {
+    // The high bits of a product with an odd number are spread well.
+    let key = (a as u64) << 32 | u64::from(frame);
+    let mixed = key.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    if (mixed ^ mixed >> 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63 == 0 {
+        [a, b]
+    } else {
+        [b, a]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -347,11 +360,29 @@ mod tests {
     }
 
     #[test]
+    fn interruptions_of_the_frame_before_are_no_speed() {
+        let mut odd = pairs(60, 1.0, 1.0, 0.05);
+        odd[7].candidate[1] += 900.0;
+        odd[31].candidate[1] += 400.0;
+        let ratio = ProbeRatio::of(&odd).unwrap();
+        let [middle, ..] = ratio.bounds();
+        assert!((0.95..1.05).contains(&middle), "{middle}");
+        let costs = Costs {
+            render: 1.0,
+            incumbent_build: 0.0,
+            candidate_build: 0.0,
+            build_deviation: BUILD_DEVIATION,
+        };
+        assert_eq!(costs.decide(ratio), Decision::Undecided);
+    }
+
+    #[test]
     fn few_pairs_or_odd_times_decide_nothing() {
         let costs = Costs {
             render: 1.0,
             incumbent_build: 0.0,
             candidate_build: 0.0,
+            build_deviation: BUILD_DEVIATION,
         };
         assert_eq!(ProbeRatio::of(&[]), None);
         for count in 1..FEW_PAIRS {
@@ -369,6 +400,7 @@ mod tests {
             render: 1.0,
             incumbent_build: 0.0,
             candidate_build: 0.0,
+            build_deviation: BUILD_DEVIATION,
         };
         let decide = |costs: Costs, ratio| {
             costs.decide(ProbeRatio::of(&pairs(60, ratio, 1.0, 0.03)).unwrap())
@@ -392,6 +424,7 @@ mod tests {
             render: 1.0,
             incumbent_build: 0.0,
             candidate_build: 0.0,
+            build_deviation: BUILD_DEVIATION,
         };
         let decided = |parts: &[f64], before: Option<ProbeRatio>| {
             let mut evidence = Evidence::default();
@@ -408,6 +441,22 @@ mod tests {
         // Nor together with an earlier probe.
         let before = ProbeRatio::of(&pairs(60, 0.93, 1.0, 0.02));
         assert_eq!(decided(&[0.93, 0.93], before), [Undecided, Accepted]);
+    }
+
+    #[test]
+    fn any_two_frames_share_half_of_the_candidates_tiles() {
+        let own = |frame: u32| -> Vec<bool> {
+            let mut own = vec![false; 200];
+            for pair in spread_order(200, frame).chunks_exact(2) {
+                own[turn([pair[0], pair[1]], frame)[0]] = true;
+            }
+            own
+        };
+        for (a, b) in (0..40).flat_map(|a| (0..a).map(move |b| (a, b))) {
+            let both = own(a).into_iter().zip(own(b)).filter(|&(a, b)| a && b);
+            let count = both.count();
+            assert!((25..=75).contains(&count), "{a} {b} {count}");
+        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::{
     binning::{self, Rounding},
     control::{CHECK_SIZE, Running},
     introsort, partition,
-    primitive::{Bounds, PrimitiveRef, RangeBounds},
+    primitive::{PrimitiveRef, RangeBounds},
     record::Record,
     spatial::{self, Cutting, SpatialSplit},
     tasks,

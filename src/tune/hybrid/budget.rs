@@ -38,7 +38,7 @@ const BUILD_FACTORS: [(Quality, f64); 5] = [
 pub(super) struct Budget {
     /// The share of all time that may be lost.
     pub(super) share: f64,
-    /// Seconds of a frame.
+    /// Seconds of a frame that tries nothing, as of late.
     frame: f64,
     /// Seconds of all frames, what trials took of them, and what better trees saved.
     spent: f64,
@@ -59,14 +59,15 @@ impl Budget {
         }
     }
 
-    /// A new search, of which nothing is spent, in frames that take `frame` seconds.
-    pub(super) fn begin(&mut self, frame: f64) {
-        (self.frame, self.spent, self.trials, self.saved) = (frame, 0.0, 0.0, 0.0);
+    /// A new search, of which nothing is spent.
+    pub(super) fn begin(&mut self) {
+        (self.spent, self.trials, self.saved) = (0.0, 0.0, 0.0);
     }
 
-    /// A frame that took `time` seconds, `lost` of them for a trial, and would have taken `saved` more by the
-    /// tree of the beginning.
-    pub(super) fn add_frame(&mut self, time: f64, lost: f64, saved: f64) {
+    /// A frame that took `time` seconds where one that tries nothing takes `usual`, `lost` of them for a trial, and
+    /// would have taken `saved` more by the tree of the beginning.
+    pub(super) fn add_frame(&mut self, time: f64, usual: f64, lost: f64, saved: f64) {
+        self.frame = usual;
         self.spent += time;
         self.trials += lost;
         self.saved += saved;
@@ -107,23 +108,25 @@ mod tests {
 
     #[test]
     fn a_share_of_a_run_and_of_what_was_saved() {
+        let third = 1.0 / 3.0;
         let mut budget = Budget::new(0.02);
-        budget.begin(1.0 / 3.0);
+        budget.begin();
+        budget.add_frame(third, third, 0.0, 0.0);
         assert!(budget.allows(0.8, true) && !budget.allows(0.81, true));
         assert!(budget.allows(0.6, false) && !budget.allows(0.61, false));
-        budget.add_frame(1.2, 0.7, 0.0);
+        budget.add_frame(1.0, third, 0.7, 0.0);
         assert!(budget.allows(0.09, true) && !budget.allows(0.11, true));
         // A better tree pays for more trials.
         for _ in 0..10 {
-            budget.add_frame(0.4, 0.0, 0.1);
+            budget.add_frame(0.4, third, 0.0, 0.1);
         }
         assert!(budget.allows(0.59, true) && !budget.allows(0.61, true));
         // And so does a long run.
         for _ in 0..1000 {
-            budget.add_frame(0.4, 0.0, 0.0);
+            budget.add_frame(0.4, third, 0.0, 0.0);
         }
         assert!(budget.allows(7.9, true) && !budget.allows(8.0, true));
-        budget.begin(1.0 / 3.0);
+        budget.begin();
         assert!(budget.allows(0.8, true) && !budget.allows(0.81, true));
     }
 
@@ -131,8 +134,8 @@ mod tests {
     fn nothing_and_everything() {
         let (mut none, mut all) = (Budget::new(0.0), Budget::new(f64::INFINITY));
         for budget in [&mut none, &mut all] {
-            budget.begin(0.0);
-            budget.add_frame(0.0, 0.0, 0.0);
+            budget.begin();
+            budget.add_frame(0.0, 0.0, 0.0, 0.0);
         }
         assert!(!none.allows(1e-9, true) && all.allows(1e9, true));
     }

@@ -24,16 +24,40 @@ const KEPT: usize = 3;
 impl<'a, C: Clock> Hybrid<'a, C> {
     /// Looks whether frames take what they took: `times` of tiles with the incumbent.
     pub(super) fn watch(&mut self, times: &[(usize, f64)]) {
-        let (mut took, mut expected) = (0.0, 0.0);
-        for &(tile, time) in times {
-            took += time;
-            expected += self.tiles[tile];
-            let most = INTERRUPTED * self.tiles[tile];
-            self.tiles[tile] += FRESH * (time.min(most) - self.tiles[tile]);
-        }
-        if self.detector.add((took / expected).ln()) && !self.is_searching {
+        let factor = self.learn_tiles(times, FRESH);
+        if self.detector.add(factor.ln()) && !self.is_searching {
             self.check = self.yardstick();
         }
+    }
+
+    /// Learns what tiles are expected to take, `weight` of it from these times; what they took over what was expected.
+    ///
+    /// Tiles that are not among them follow by that factor: else those of which much is known would differ from the
+    /// others by what the machine does, and a candidate that is tried on either would seem better or worse.
+    pub(super) fn learn_tiles(&mut self, times: &[(usize, f64)], weight: f64) -> f64 {
+        let took: f64 = times.iter().map(|(_, time)| time).sum();
+        let expected: f64 = times.iter().map(|&(tile, _)| self.tiles[tile]).sum();
+        let factor = took / expected;
+        if !(factor > 0.0 && factor.is_finite()) {
+            return factor;
+        }
+        let mut is_known = vec![false; self.tiles.len()];
+        for &(tile, time) in times {
+            is_known[tile] = true;
+            let own = &mut self.tiles[tile];
+            let most = INTERRUPTED * factor * *own;
+            *own += weight * (time.min(most) - *own);
+        }
+        let follow = 1.0 + weight * (factor - 1.0);
+        for (own, _) in self
+            .tiles
+            .iter_mut()
+            .zip(is_known)
+            .filter(|(_, known)| !known)
+        {
+            *own *= follow;
+        }
+        factor
     }
 
     /// The best of what is not the incumbent.
@@ -83,7 +107,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
             background.give_up();
         }
         incumbent.begin_again();
-        self.budget.begin(cost);
+        self.budget.begin();
         self.is_searching = true;
     }
 

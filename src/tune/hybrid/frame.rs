@@ -18,6 +18,8 @@ pub(super) struct Frame<'c> {
     pub(super) sample: u32,
     /// Seconds of the tiles that were traced through the tree that is the incumbent in the end.
     pub(super) times: Vec<(usize, f64)>,
+    /// Seconds that threads worked, through whatever tree.
+    pub(super) work: f64,
     done: Vec<bool>,
     cancel: &'c CancelToken,
 }
@@ -29,6 +31,7 @@ impl<'c> Frame<'c> {
             film,
             sample,
             times: Vec::with_capacity(tiles),
+            work: 0.0,
             done: vec![false; tiles],
             cancel,
         }
@@ -62,8 +65,9 @@ impl<C: Clock> Hybrid<'_, C> {
         };
         let (film, sample, cancel) = (&mut frame.film, frame.sample, frame.cancel);
         let times = stage.render_tiles(film, sample, limit, cancel, busy, left)?;
-        for &(tile, _) in &times {
+        for &(tile, time) in &times {
             frame.done[tile] = true;
+            frame.work += time;
         }
         Ok(times)
     }

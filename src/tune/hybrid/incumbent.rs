@@ -2,12 +2,16 @@
 //!
 //! When a candidate is accepted its build was timed once, and of many candidates it is the one whose build
 //! happened to be short that is accepted. Where trees are built again and again its cost is therefore
-//! reckoned from all builds that it has had since.
+//! reckoned from all builds that it has had since, and by their median: one that was interrupted, or was the first
+//! to touch its memory, may take four times as long, and whatever is beside it would seem better.
 
 use raywright_bvh::{BuildParams, Bvh};
 use raywright_tuner::Config;
 
-use crate::tune::probe::{Costs, ProbeRatio};
+use crate::tune::probe::{BUILD_DEVIATION, Costs, ProbeRatio};
+
+/// Standard deviation of a normal distribution over its median distance from the middle.
+const NORMAL: f64 = 1.4826;
 
 /// The tree that frames are rendered with.
 #[derive(Debug)]
@@ -84,9 +88,18 @@ impl Incumbent {
         self.step = None;
     }
 
-    /// Seconds of its build, the mean of all.
+    /// Seconds of its build: the median of all, the lower of two.
     pub(super) fn build(&self) -> f64 {
-        self.builds.iter().sum::<f64>() / self.builds.len() as f64
+        lower_median(self.builds.clone())
+    }
+
+    /// The standard deviation of the time of one build, as a share of it.
+    pub(super) fn build_deviation(&self) -> f64 {
+        let middle = self.build();
+        let off = self.builds.iter().map(|build| (build - middle).abs());
+        let share = NORMAL * lower_median(off.collect()) / middle;
+        // Nothing where builds take no time.
+        BUILD_DEVIATION.max(share)
     }
 
     /// The logarithm of its cost over that of the first incumbent.
@@ -116,6 +129,13 @@ impl Incumbent {
     }
 }
 
+/// The middle of some values, the lower one of an even number; NaN of none.
+fn lower_median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len().saturating_sub(1) / 2;
+    values.get(middle).copied().unwrap_or(f64::NAN)
+}
+
 #[cfg(test)]
 mod tests {
     use raywright_bvh::TriangleMesh;
@@ -139,6 +159,7 @@ mod tests {
             render: 0.6,
             incumbent_build: 0.4,
             candidate_build: 0.3,
+            build_deviation: BUILD_DEVIATION,
         };
         let ratio = ProbeRatio {
             log: 0.0,
@@ -149,7 +170,7 @@ mod tests {
         assert!((incumbent.log_cost() - 0.9_f64.ln()).abs() < 1e-12);
         let sure = incumbent.sure_log_cost();
         assert!(sure < -0.05 && sure > incumbent.log_cost(), "{sure}");
-        for build in [0.41, 0.42, 0.43, 0.44, 0.4] {
+        for build in [0.41, 0.4, 0.4] {
             incumbent.rebuilt(tree(), build);
         }
         assert!(incumbent.log_cost().abs() < 1e-12, "{incumbent:?}");
@@ -175,5 +196,26 @@ mod tests {
         );
         incumbent.moved(tree(), 7.0);
         assert_eq!((incumbent.build(), incumbent.log_cost()), (7.0, cost));
+    }
+    #[test]
+    fn a_build_that_was_interrupted_is_no_build() {
+        let params = BuildParams::default();
+        let space = ParameterSpace::new(&params, &[], SpaceAxes::Canonical).unwrap();
+        let config = space.config(&params).unwrap();
+        // Memory that is new.
+        let mut incumbent = Incumbent::first(config, params, tree(), 0.123);
+        incumbent.rebuilt(tree(), 0.035);
+        assert_eq!(incumbent.build(), 0.035);
+        for build in [0.036, 0.2, 0.034, 0.035] {
+            incumbent.rebuilt(tree(), build);
+        }
+        assert_eq!(incumbent.build(), 0.035);
+        assert_eq!(incumbent.build_deviation(), BUILD_DEVIATION);
+        // Where they differ all the time, one tells little.
+        for build in [0.028, 0.05, 0.026, 0.044, 0.043, 0.029, 0.048] {
+            incumbent.rebuilt(tree(), build);
+        }
+        let deviation = incumbent.build_deviation();
+        assert!((0.15..0.4).contains(&deviation), "{deviation}");
     }
 }

@@ -10,7 +10,7 @@ use raywright_tuner::{ChangeDetector, Outcome, Reason, Trial};
 
 use super::{Built, Candidate, Hybrid, Incumbent, LEAST_NOISE, MOST_PROBES, Probed, frame::Frame};
 use crate::tune::{
-    probe::{Costs, Decision, Evidence, Pair, ProbeRatio, SHARES, spread_order},
+    probe::{Costs, Decision, Evidence, Pair, ProbeRatio, SHARES, spread_order, turn},
     session::TrialFailure,
     stage::{Clock, FrameTimes, SessionError},
 };
@@ -117,6 +117,7 @@ impl<C: Clock> Hybrid<'_, C> {
             render: self.render_time(),
             incumbent_build: share * incumbent.build(),
             candidate_build: share * build,
+            build_deviation: incumbent.build_deviation(),
         }
     }
 
@@ -194,12 +195,7 @@ impl<C: Clock> Hybrid<'_, C> {
         }
         if is_accepted {
             frame.times.extend(&probe.candidate_times);
-            let factor = probe.all.log.exp();
-            self.tiles.iter_mut().for_each(|time| *time *= factor);
-            // Most of them are known now.
-            for &(tile, time) in &frame.times {
-                self.tiles[tile] = time;
-            }
+            self.learn_tiles(&frame.times, 1.0);
             let accepted = (trial.canonical.clone(), params, tree, build.as_secs_f64());
             let build_share = self.stage.settings.metric.build_share();
             let old = incumbent.replace(accepted, costs, probe.all, build_share);
@@ -240,19 +236,19 @@ impl<C: Clock> Hybrid<'_, C> {
             let end = 2 * ((share * order.len() as f64) as usize).min(order.len() / 2);
             let part = &order[begin.min(end)..end];
             begin = end;
-            // Even ones are the candidate's.
+            let turned = |pair: &[usize]| turn([pair[0], pair[1]], frame.sample);
+            let twos: Vec<[usize; 2]> = part.chunks_exact(2).map(turned).collect();
             let mut trees: Vec<Option<&Bvh>> = vec![None; order.len()];
-            for pair in part.chunks_exact(2) {
-                trees[pair[0]] = Some(candidate);
-                trees[pair[1]] = Some(incumbent);
+            for &[own, other] in &twos {
+                trees[own] = Some(candidate);
+                trees[other] = Some(incumbent);
             }
             let times = self.trace(frame, limit, |tile| trees[tile])?;
             let mut took: Vec<Option<f64>> = vec![None; order.len()];
             for &(tile, time) in &times {
                 took[tile] = Some(time);
             }
-            let pairs = part.chunks_exact(2).filter_map(|pair| {
-                let [own, other] = [pair[0], pair[1]];
+            let pairs = twos.iter().filter_map(|&[own, other]| {
                 candidate_times.extend(took[own].map(|time| (own, time)));
                 incumbent_times.extend(took[other].map(|time| (other, time)));
                 Some(Pair {

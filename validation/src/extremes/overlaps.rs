@@ -1,7 +1,6 @@
 //! T19: triangles in one plane. Of equal distances the lowest id is hit; of distances that differ by rounding alone,
 //! either, but the same one by every tree and instruction set.
 
-use rayon::prelude::*;
 use raywright_bvh::{MeshError, Ray, TriangleMesh, Vec3};
 
 use super::{

@@ -1,7 +1,6 @@
 //! T07, T08: what meets exactly. Rays between points of the lattices that meshes are made of, and rays along the axes
 //! with zeros of both signs, in the planes of boxes and walls.
 
-use rayon::prelude::*;
 use raywright_bvh::{Accuracy, MeshError, Ray, TriangleMesh, Vec3};
 
 use super::{

@@ -2,14 +2,13 @@
 
 use std::f32::consts::PI;
 
-use rayon::prelude::*;
-use raywright_bvh::{Accuracy, Hit, Ray, TriangleMesh, Vec3};
+use raywright_bvh::{Accuracy, Hit, Ray, Vec3};
 
 use super::{
     ExtremesError, Findings, Settings, meshes,
-    modes::{ACCURACIES, Bits, Judged, Sampler, answer, ask_all, bits, cuts, exact_hits, name},
+    modes::{ACCURACIES, Bits, Judged, Sampler, ask_all, bits, cuts, exact_hits, name},
 };
-use crate::hits::{Answer, Class};
+use crate::hits::Class;
 
 /// Triangles of a strip.
 const STRIP: u32 = 1000;
