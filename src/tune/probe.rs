@@ -148,7 +148,7 @@ fn without_interruptions(pairs: &[Pair]) -> Vec<Pair> {
         if time > INTERRUPTED * usual * expected {
             [INTERRUPTED * usual * expected, expected]
         } else if INTERRUPTED * time < usual * expected {
-            [time, INTERRUPTED * time / usual]
+            [time, time / usual]
         } else {
             [time, expected]
         }

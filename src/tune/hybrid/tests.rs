@@ -18,19 +18,31 @@ use crate::tune::{Decision, Metric, SpaceAxes, TrialFailure, WallClock, portfoli
 
 /// Goes on by another step each time that it is looked at; with 0 it stands still.
 #[derive(Clone)]
-struct OddClock(Arc<AtomicU64>, u64);
+struct OddClock {
+    looks: Arc<AtomicU64>,
+    /// Nanoseconds that have passed.
+    passed: Arc<AtomicU64>,
+    /// Microseconds from look to look, less than half of it more.
+    step: Arc<AtomicU64>,
+}
 
 impl OddClock {
     fn new(step: u64) -> Self {
-        Self(Arc::new(AtomicU64::new(1)), step)
+        Self {
+            looks: Arc::default(),
+            passed: Arc::default(),
+            step: Arc::new(AtomicU64::new(step)),
+        }
     }
 }
 
 impl Clock for OddClock {
     fn now(&self) -> Duration {
-        let looks = self.0.fetch_add(1, Ordering::Relaxed);
+        let looks = self.looks.fetch_add(1, Ordering::Relaxed);
+        let step = self.step.load(Ordering::Relaxed);
         let odd = looks.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 54;
-        Duration::from_nanos(looks * 1000 * self.1 + odd.min(self.1 * 500))
+        let more = step * (1000 + odd.min(500));
+        Duration::from_nanos(self.passed.fetch_add(more, Ordering::Relaxed))
     }
 }
 
@@ -364,7 +376,7 @@ fn where_frames_bear_their_builds_none_is_in_the_background() {
 fn where_nothing_is_tried_hardly_a_clock_is_read() {
     let place = place("interior");
     let clock = OddClock::new(1);
-    let looks = clock.0.clone();
+    let looks = clock.looks.clone();
     let run = hybrid(&place, Metric::Render, &BuildParams::default(), clock);
     let mut run = run.frozen();
     run.frame(&CancelToken::new()).unwrap();
@@ -379,4 +391,33 @@ fn where_nothing_is_tried_hardly_a_clock_is_read() {
         "{cost:?} {frame:?}"
     );
     assert!(run.film().mean() == plain(&place, 2).mean());
+}
+
+/// The first frame finds memory and caches cold, and a busy machine is slower for a while.
+#[test]
+fn tiles_that_are_known_and_those_that_are_not_are_expected_at_one_speed() {
+    let place = place("interior");
+    let clock = OddClock::new(8);
+    let mut run = hybrid(&place, Metric::Render, &BuildParams::default(), clock);
+    run.frame(&CancelToken::new()).unwrap();
+    for weight in [FRESH, 1.0] {
+        let before = run.tiles.clone();
+        let times = before.iter().enumerate().step_by(3);
+        let times: Vec<(usize, f64)> = times.map(|(tile, time)| (tile, 0.25 * time)).collect();
+        let factor = run.learn_tiles(&times, weight);
+        assert!((factor - 0.25).abs() < 1e-12);
+        let expected = 1.0 - 0.75 * weight;
+        for (tile, (after, before)) in run.tiles.iter().zip(&before).enumerate() {
+            assert!((after / before - expected).abs() < 1e-9, "{tile}");
+        }
+    }
+    // One that was interrupted is not expected to be so again, and what is no time says nothing.
+    let before = run.tiles.clone();
+    let mut times: Vec<(usize, f64)> = before.iter().copied().enumerate().collect();
+    times[5].1 *= 1000.0;
+    let factor = run.learn_tiles(&times, 1.0);
+    assert!(run.tiles[5] < 1.01 * INTERRUPTED * factor * before[5]);
+    let before = run.tiles.clone();
+    run.learn_tiles(&[(0, 0.0), (1, 0.0)], 1.0);
+    assert_eq!(run.tiles, before);
 }

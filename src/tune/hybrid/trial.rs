@@ -54,9 +54,7 @@ impl<C: Clock> Hybrid<'_, C> {
         let is_ready = ready.is_some();
         let built = match ready {
             _ if is_own => Ok(None),
-            Some(built) => {
-                built.and_then(|(tree, build)| Ok(Some((self.stage.on_isa(tree), build))))
-            }
+            Some(built) => built.map(|(tree, build)| Some((self.stage.on_isa(tree), build))),
             None => self.stage.build(&params).map(Some),
         };
         let (outcome, build) = match built {
