@@ -21,8 +21,10 @@ use crate::exact::ExactHit;
 pub struct Judge<'m> {
     meshes: &'m [&'m TriangleMesh],
     accuracy: Accuracy,
-    /// The power of two above the largest coordinate, if distances are kept to boxes of triangles.
-    coordinate_bound: Option<f64>,
+    /// The power of two above the largest coordinate.
+    coordinate_bound: f64,
+    /// Whether distances may be left as they are, too.
+    is_free: bool,
     /// Triangles at each edge.
     neighbours: HashMap<EdgeKey, Vec<[u32; 2]>>,
 }
@@ -53,16 +55,17 @@ impl<'m> Judge<'m> {
         Self {
             meshes,
             accuracy,
-            coordinate_bound: Some(2.0 * power_of_two_below(largest)),
+            coordinate_bound: 2.0 * power_of_two_below(largest),
+            is_free: false,
             neighbours,
         }
     }
 
-    /// The same for a tracer with tests of the same form that leaves distances as they are, where ours keeps them
+    /// The same for a tracer with tests of the same form that may leave distances as they are, where ours keeps them
     /// to the boxes of triangles.
     #[must_use]
     pub fn of_free_distances(mut self) -> Self {
-        self.coordinate_bound = None;
+        self.is_free = true;
         self
     }
 
@@ -72,9 +75,15 @@ impl<'m> Judge<'m> {
 
     fn by_ours(&self, ids: [u32; 2], ray: &Ray) -> Evaluation {
         let corners = self.corners(ids);
-        match self.coordinate_bound {
-            Some(bound) => Evaluation::of_ours(corners, ray, self.accuracy, bound),
-            None => Evaluation::new(corners, ray, TriangleTestForm::of_ours(self.accuracy)),
+        let kept = Evaluation::of_ours(corners, ray, self.accuracy, self.coordinate_bound);
+        if !self.is_free {
+            return kept;
+        }
+        let free = Evaluation::new(corners, ray, TriangleTestForm::of_ours(self.accuracy));
+        let ([from, to], [other_from, other_to]) = (kept.t_range, free.t_range);
+        Evaluation {
+            t_range: [from.min(other_from), to.max(other_to)],
+            ..kept
         }
     }
 
