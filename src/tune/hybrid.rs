@@ -193,16 +193,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
     /// has worked. Only where trees serve any number of frames ([`Metric::Render`](super::Metric::Render)):
     /// where frames bear a share of their build, nothing is built in the background.
     ///
-    /// ```
-    /// use raywright::tune::{Hybrid, Clock, SessionError};
-    /// # use raywright::imaging::CancelToken;
-    /// fn frames<C: Clock + Clone + Send>(run: Hybrid<'_, C>) -> Result<(), SessionError> {
-    ///     std::thread::scope(|scope| {
-    ///         let mut run = run.with_background_builds(scope);
-    ///         run.frame(&CancelToken::new()).map(|_| ())
-    ///     })
-    /// }
-    /// ```
+    /// The run has to begin within the scope: see the example `08_tune_while_rendering`.
     #[must_use]
     pub fn with_background_builds<'env: 'a>(mut self, scope: &'a Scope<'a, 'env>) -> Self
     where
