@@ -317,8 +317,9 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         let trial = self.tuner.ask_for(&config);
         start += self.time_of(|| begins(&trial));
         let (mut tree, mut build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
-        if !self.is_frozen && self.stage.settings.metric.build_share() > 0.0 {
-            // The first to touch its memory takes up to four times as long as those after it.
+        if !self.is_frozen && self.background.is_none() {
+            // The first to touch its memory takes up to four times as long as those after it, which tells
+            // nothing of what others will take.
             self.stage.recycle(tree);
             (tree, build) = self.stage.build(&self.first).map_err(SessionError::Build)?;
         }
