@@ -16,7 +16,7 @@ use raywright::{
     tuner::GaussianProcess,
 };
 
-const FRAMES: u32 = 400;
+const FRAMES: u32 = 160;
 
 /// Trials may take a fifth of all time here, so that there is something to see.
 const OVERHEAD: f64 = 0.2;

@@ -96,3 +96,12 @@ fn a_volume() {
         "{printed}"
     );
 }
+
+#[test]
+fn tuning_while_one_renders() {
+    let Some(printed) = run("08_tune_while_rendering") else {
+        return;
+    };
+    assert!(printed.contains("the camera turns round"), "{printed}");
+    assert!(printed.contains("best: Some(BuildParams"), "{printed}");
+}

@@ -10,6 +10,7 @@ mod trees;
 mod trends;
 
 use clap::{Parser, Subcommand};
+use raywright_validation::embree::{Embree, EmbreeError};
 
 /// Compares raywright with oracles.
 #[derive(Debug, Parser)]
@@ -54,5 +55,16 @@ pub(crate) fn run(cli: Cli) -> Result<Verdict, Box<dyn std::error::Error>> {
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Rebuilds(args) => rebuilds::run(&args),
         Command::Trends(args) => trends::run(&args),
+    }
+}
+
+/// The Embree library; `None`, with a line that says so, if there is none.
+fn embree_or_skip() -> Result<Option<Embree>, EmbreeError> {
+    match Embree::find() {
+        Err(error @ EmbreeError::NotFound { .. }) => {
+            println!("skipped, nothing compared: {error}");
+            Ok(None)
+        }
+        found => found.map(Some),
     }
 }

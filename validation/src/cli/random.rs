@@ -9,12 +9,11 @@ use std::{error::Error, path::Path};
 
 use raywright_bvh::Quality;
 use raywright_validation::{
-    embree::{Embree, EmbreeError},
     golden::{self, GoldenQuality},
     random::RandomBuild,
 };
 
-use super::{Verdict, table::Table};
+use super::{Verdict, embree_or_skip, table::Table};
 
 /// Scenes whose parts are built over, where they are there: architecture, a scene of extreme sizes
 /// with many triangles without area, plants, whole coordinates.
@@ -33,13 +32,8 @@ pub(super) fn run(builds: u64, seed: u64, scenes: &Path) -> Result<Verdict, Box<
     rayon::ThreadPoolBuilder::new()
         .num_threads(2)
         .build_global()?;
-    let embree = match Embree::find() {
-        Ok(embree) => embree,
-        Err(error @ EmbreeError::NotFound { .. }) => {
-            println!("skipped, nothing compared: {error}");
-            return Ok(Verdict::AllEqual);
-        }
-        Err(error) => return Err(error.into()),
+    let Some(embree) = embree_or_skip()? else {
+        return Ok(Verdict::AllEqual);
     };
     let device = embree.device(1)?;
     let mut sets = Vec::new();

@@ -9,13 +9,11 @@ use std::{
 use clap::{Args, ValueEnum};
 use raywright_bvh::Rounding;
 use raywright_validation::{
-    TriangleSet,
-    embree::{Embree, EmbreeError},
-    golden,
+    TriangleSet, golden,
     trends::{self, Agreement, ENGINES, SWEEPS, Subject, Sweep, Trend},
 };
 
-use super::{Verdict, random::keep_to_one_core, trees::default_data};
+use super::{Verdict, embree_or_skip, random::keep_to_one_core, trees::default_data};
 
 /// Arguments of `trends`.
 #[derive(Debug, Args)]
@@ -71,13 +69,8 @@ pub(crate) fn run(args: &TrendsArgs) -> Result<Verdict, Box<dyn Error>> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build_global()?;
-    let embree = match Embree::find() {
-        Ok(embree) => embree,
-        Err(error @ EmbreeError::NotFound { .. }) => {
-            println!("skipped, nothing compared: {error}");
-            return Ok(Verdict::AllEqual);
-        }
-        Err(error) => return Err(error.into()),
+    let Some(embree) = embree_or_skip()? else {
+        return Ok(Verdict::AllEqual);
     };
     let device = embree.device(1)?;
     let rounding = match args.rounding {
