@@ -188,6 +188,63 @@ fn rays_from_inside_along_faces_and_through_corners() {
     }
 }
 
+/// Two neighbouring values, with one of which a ray enters the first box and with the other not;
+/// both are 0 or positive.
+fn edge_of_pad(
+    boxes: &[Aabb],
+    inside: f32,
+    outside: f32,
+    ray: impl Fn(f32) -> Ray,
+) -> Option<[Ray; 2]> {
+    let enters = |bits| {
+        let hits = reference::box_intervals(boxes, &ray(f32::from_bits(bits))).unwrap();
+        hits.iter().any(|hit| hit.index == 0)
+    };
+    let (mut inside, mut outside) = (inside.to_bits(), outside.to_bits());
+    if !enters(inside) || enters(outside) {
+        return None;
+    }
+    while inside.abs_diff(outside) > 1 {
+        let middle = inside.midpoint(outside);
+        *(if enters(middle) {
+            &mut inside
+        } else {
+            &mut outside
+        }) = middle;
+    }
+    Some([inside, outside].map(|bits| ray(f32::from_bits(bits))))
+}
+
+/// Boxes of nodes are padded by more than those of primitives, for they are computed by other
+/// operations: rays at the very edge of a primitive's pad need the difference.
+#[test]
+fn rays_at_the_edge_of_the_pad_enter_every_node_above() {
+    let mut random = Random(11);
+    let mut cases = 0;
+    for _ in 0..60 {
+        let boxes = [3.0, 4.0, 5.0].map(|place| {
+            let a = random.vector() + place;
+            Aabb::EMPTY.extended_by(a).extended_by(a + random.vector())
+        });
+        let centre = (boxes[0].min + boxes[0].max) * 0.5;
+        let mut rays = vec![];
+        for _ in 0..8 {
+            let direction = random.vector();
+            let origin = centre - direction * 2.0;
+            // Past the box along an axis, and up to it.
+            rays.extend(edge_of_pad(&boxes, origin.x, origin.x + 9.0, |x| {
+                Ray::new(Vec3 { x, ..origin }, direction)
+            }));
+            rays.extend(edge_of_pad(&boxes, 2.0, 0.0, |t_max| {
+                Ray::new(origin, direction).with_range(0.0, t_max)
+            }));
+        }
+        cases += rays.len();
+        check(&boxes, rays.as_flattened()).unwrap();
+    }
+    assert!(cases > 600, "{cases}");
+}
+
 #[test]
 fn segments_are_the_union_of_intervals() {
     let boxes = [

@@ -38,11 +38,14 @@ pub(crate) fn build<C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
     if workspace.references.is_empty() {
         return Ok(None);
     }
+    // What comes before, the references, and what follows, the layout, do not ask.
+    workspace.control.check()?;
     let n = workspace.references.len();
     let root = match params.rounding {
         Rounding::Exact => build_rounded::<Exact, C>(workspace, corners, params),
         Rounding::Embree => build_rounded::<AsEmbree, C>(workspace, corners, params),
     }?;
+    workspace.control.check()?;
     if let Some(progress) = &workspace.control.progress {
         progress(n, n);
     }

@@ -65,7 +65,8 @@ pub(crate) fn build<R: Rounding>(
             CODE_SHIFT,
             CODE_SHIFT + 30,
             |key| *key,
-        );
+            &workspace.control,
+        )?;
     }
     let root = Range {
         keys: &mut workspace.keys,

@@ -205,14 +205,13 @@ impl<C: Fn(LeafReference) -> [Vec3; 3] + Sync> Cutting<C> {
         };
         if tasks::in_pieces(references.len()) {
             let of_piece = |piece: &[PrimitiveRef]| {
+                running.check()?;
                 let mut bins = Bins::default();
-                if running.check().is_ok() {
-                    fill(piece, &mut bins);
-                }
-                bins
+                fill(piece, &mut bins);
+                Ok(bins)
             };
-            *bins = tasks::map_merge(references, &of_piece, &|a: Bins, b| a.merge(&b));
-            running.check()?;
+            let merge = |a: Result<Bins, BuildError>, b: Result<_, _>| Ok(a?.merge(&b?));
+            *bins = tasks::map_merge(references, &of_piece, &merge)?;
         } else {
             *bins = Bins::default();
             for piece in references.chunks(tasks::PIECE_SIZE) {

@@ -1,6 +1,8 @@
 //! The few ways in which a build uses threads, each with a serial form for builds without the
 //! feature `parallel`. Results never depend on the number of threads.
 
+use crate::error::BuildError;
+
 /// Ranges below this are built by the thread that has them: a task costs about a microsecond, a
 /// range of this size some hundred.
 pub(crate) const TASK_SIZE: usize = 4096;
@@ -92,22 +94,23 @@ pub(crate) fn for_each_piece_of<T: Send>(
     );
 }
 
-/// Treats the items piece by piece; tells of each piece where it begins, `begin` being the place of
-/// the first item.
-pub(crate) fn for_each_piece_from<T: Send>(
+/// Treats the items piece by piece until one fails; tells of each piece where it begins, `begin`
+/// being the place of the first item.
+pub(crate) fn try_for_each_piece_from<T: Send>(
     begin: usize,
     items: &mut [T],
-    treat: &(impl Fn(usize, &mut [T]) + Sync),
-) {
+    treat: &(impl Fn(usize, &mut [T]) -> Result<(), BuildError> + Sync),
+) -> Result<(), BuildError> {
     if items.len() <= PIECE_SIZE {
         return treat(begin, items);
     }
     let middle = items.len() / 2;
     let (left, right) = items.split_at_mut(middle);
-    join(
-        || for_each_piece_from(begin, left, treat),
-        || for_each_piece_from(begin + middle, right, treat),
+    let (left, right) = join(
+        || try_for_each_piece_from(begin, left, treat),
+        || try_for_each_piece_from(begin + middle, right, treat),
     );
+    left.and(right)
 }
 
 /// Fills each result from its job, at the same time where jobs are large. `memory` goes from job

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::{
     super::{
         LeafReference,
+        control::{BuildControl, CHECK_SIZE},
         primitive::Bounds,
         record::Record,
         recursion::{MAX_CHILDREN, depth_error, levels_below},
@@ -15,6 +16,7 @@ use crate::error::BuildError;
 
 /// What is needed to write the wide tree.
 pub(super) struct Emission<'a> {
+    pub(super) control: &'a BuildControl,
     pub(super) model: Model,
     pub(super) nodes: &'a [Node],
     pub(super) ids: &'a [LeafReference],
@@ -29,6 +31,7 @@ impl Emission<'_> {
     pub(super) fn node(&mut self, index: u32, level: u32) -> Result<Record, BuildError> {
         let params = &self.model.params;
         let node = &self.nodes[index as usize];
+        self.check(node.summary.references)?;
         let Below::Children(children) = node.below else {
             return self.by_number(index, level);
         };
@@ -44,6 +47,14 @@ impl Emission<'_> {
         let bounds = Bounds::of_aabb(&node.bounds);
         let records = &self.records[first..first + len];
         Ok(Record::inner(&bounds, first, records))
+    }
+
+    /// Whether to go on, if there are many references.
+    fn check(&self, references: u32) -> Result<(), BuildError> {
+        if references as usize >= CHECK_SIZE {
+            self.control.check()?;
+        }
+        Ok(())
     }
 
     /// Replaces nodes by their children, the largest first, until a wide node is full.
@@ -113,6 +124,7 @@ impl Emission<'_> {
         let params = &self.model.params;
         let (width, max_leaf_size) = (params.branching_factor as usize, params.max_leaf_size);
         let references = self.references(&range);
+        self.check(references)?;
         if level > params.max_depth {
             return Err(depth_error(params, references as usize, level));
         }

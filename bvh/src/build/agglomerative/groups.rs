@@ -3,14 +3,18 @@
 use super::{
     super::{
         LeafReference,
+        control::BuildControl,
         primitive::{Bounds, PrimitiveRef},
         tasks::{self, PIECE_SIZE},
     },
     BLOCK, Below, Cluster, Memory, Model, Node, Piece, Place, half_area, lesser,
 };
-use crate::simd::{
-    Isa,
-    build::{self, EightLanes, Halves},
+use crate::{
+    error::BuildError,
+    simd::{
+        Isa,
+        build::{self, EightLanes, Halves},
+    },
 };
 
 /// Fills in the ids along the curve, the first clusters and their nodes.
@@ -19,7 +23,8 @@ pub(super) fn first_clusters(
     references: &[PrimitiveRef],
     isa: Isa,
     memory: &mut Memory,
-) {
+    control: &BuildControl,
+) -> Result<(), BuildError> {
     let n = references.len();
     let Memory {
         places,
@@ -32,11 +37,12 @@ pub(super) fn first_clusters(
     ids.resize(n, LeafReference::default());
     pieces.resize(n.div_ceil(PIECE_SIZE), Piece::default());
     let kernel = Group {
+        control,
         references,
         places,
         most: model.params.min_leaf_size,
     };
-    group_pieces(isa, kernel, ids, clusters, pieces);
+    group_pieces(isa, kernel, ids, clusters, pieces)?;
     // Closes the gaps behind the clusters of each piece.
     let mut count = 0;
     for (piece, begin) in pieces.iter().zip((0..).step_by(PIECE_SIZE)) {
@@ -62,6 +68,7 @@ pub(super) fn first_clusters(
         };
         first += references;
     }
+    Ok(())
 }
 
 /// Groups the references of some pieces, each at the places of its references.
@@ -71,8 +78,9 @@ fn group_pieces(
     ids: &mut [LeafReference],
     clusters: &mut [Cluster],
     pieces: &mut [Piece],
-) {
+) -> Result<(), BuildError> {
     if let [piece] = pieces {
+        kernel.control.check()?;
         piece.firsts = build::run(
             isa,
             GroupPiece {
@@ -81,7 +89,7 @@ fn group_pieces(
                 clusters,
             },
         );
-        return;
+        return Ok(());
     }
     let (left, right) = pieces.split_at_mut(pieces.len() / 2);
     let middle = left.len() * PIECE_SIZE;
@@ -92,10 +100,11 @@ fn group_pieces(
         places: places_right,
         ..kernel
     };
-    tasks::join(
+    let (left, right) = tasks::join(
         || group_pieces(isa, Group { places, ..kernel }, ids, clusters, left),
         || group_pieces(isa, kernel_right, ids_right, clusters_right, right),
     );
+    left.and(right)
 }
 
 /// Unites neighbours along the curve into the first clusters.
@@ -104,6 +113,7 @@ fn group_pieces(
 /// is nearer and a leaf of both costs no more than two leaves.
 #[derive(Clone, Copy)]
 struct Group<'a> {
+    control: &'a BuildControl,
     references: &'a [PrimitiveRef],
     places: &'a [Place],
     most: u32,

@@ -140,18 +140,19 @@ pub(crate) fn build(
 ) -> Result<Record, BuildError> {
     let n = workspace.references.len();
     let model = Model::new(params);
-    let memory = &mut workspace.agglomerative;
-    places::encode(&workspace.references, &mut memory.places);
-    places::sort(&mut memory.places, &mut memory.places_scratch);
+    let (memory, control) = (&mut workspace.agglomerative, &workspace.control);
+    places::encode(&workspace.references, &mut memory.places, control)?;
+    places::sort(&mut memory.places, &mut memory.places_scratch, control)?;
     let isa = Isa::best();
-    groups::first_clusters(&model, &workspace.references, isa, memory);
-    rounds::merge_all(&model, isa, memory, &workspace.control)?;
+    groups::first_clusters(&model, &workspace.references, isa, memory, control)?;
+    rounds::merge_all(&model, isa, memory, control)?;
     workspace.leaves.resize(n, LeafReference::default());
     workspace.records.clear();
     // The root stands behind the first clusters, or is the only one of them.
     let clusters = memory.order.len();
     let root = if clusters > 1 { clusters } else { 0 };
     let mut emission = Emission {
+        control,
         model,
         nodes: &memory.nodes,
         ids: &memory.ids,

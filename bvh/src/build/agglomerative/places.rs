@@ -1,6 +1,7 @@
 //! The order of the references along a Morton curve of 63 bits.
 
-use super::super::{curve, primitive::PrimitiveRef, radix, tasks};
+use super::super::{control::BuildControl, curve, primitive::PrimitiveRef, radix, tasks};
+use crate::error::BuildError;
 
 /// Bits of a Morton code per axis.
 const AXIS_BITS: u32 = 21;
@@ -18,18 +19,28 @@ pub(crate) struct Place {
 
 /// Sorts by the codes, equal ones by the index: by their leading bits in few passes over memory,
 /// and where those are equal, which is rare, by comparison.
-pub(super) fn sort(places: &mut [Place], scratch: &mut Vec<Place>) {
+pub(super) fn sort(
+    places: &mut [Place],
+    scratch: &mut Vec<Place>,
+    control: &BuildControl,
+) -> Result<(), BuildError> {
     const LOW_BIT: u32 = 3 * AXIS_BITS - LEADING_BITS;
-    radix::sort(places, scratch, LOW_BIT, 3 * AXIS_BITS, |place| place.code);
+    let key = |place: &Place| place.code;
+    radix::sort(places, scratch, LOW_BIT, 3 * AXIS_BITS, key, control)?;
     for run in places.chunk_by_mut(|a, b| a.code >> LOW_BIT == b.code >> LOW_BIT) {
         if run.len() > 1 {
             run.sort_unstable_by_key(|place| (place.code, place.index));
         }
     }
+    Ok(())
 }
 
 /// Fills in the place of each reference by its centroid, in a grid of cubes.
-pub(super) fn encode(references: &[PrimitiveRef], places: &mut Vec<Place>) {
+pub(super) fn encode(
+    references: &[PrimitiveRef],
+    places: &mut Vec<Place>,
+    control: &BuildControl,
+) -> Result<(), BuildError> {
     let centroids = curve::centroid_bounds(references, PrimitiveRef::doubled_centroid);
     let lower = centroids.lower().to_array();
     let [x, y, z, _] = centroids.extent().to_array();
@@ -37,7 +48,8 @@ pub(super) fn encode(references: &[PrimitiveRef], places: &mut Vec<Place>) {
     const CELLS: f32 = (1 << AXIS_BITS) as f32;
     let scale = if largest > 0.0 { CELLS / largest } else { 0.0 };
     places.resize(references.len(), Place::default());
-    tasks::for_each_piece_from(0, places, &|begin, places: &mut [Place]| {
+    tasks::try_for_each_piece_from(0, places, &|begin, places: &mut [Place]| {
+        control.check()?;
         let references = &references[begin..][..places.len()];
         for ((index, place), reference) in (begin as u32..).zip(places).zip(references) {
             let code = |axis: usize| {
@@ -50,5 +62,6 @@ pub(super) fn encode(references: &[PrimitiveRef], places: &mut Vec<Place>) {
                 index,
             };
         }
-    });
+        Ok(())
+    })
 }

@@ -56,9 +56,9 @@ pub(super) fn merge_all(
     let mut end = nodes.len();
     let count = len;
     while len > 1 {
-        control.check()?;
         let choices = &mut choices[..len];
-        tasks::for_each_piece_from(0, choices, &|begin, choices: &mut [i8]| {
+        tasks::try_for_each_piece_from(0, choices, &|begin, choices: &mut [i8]| {
+            control.check()?;
             let clusters = &clusters[..len];
             build::run(
                 isa,
@@ -68,22 +68,24 @@ pub(super) fn merge_all(
                     choices,
                 },
             );
-        });
+            Ok(())
+        })?;
         pieces.resize(len.div_ceil(PIECE_SIZE), Piece::default());
         let mut round = Round {
             model,
+            control,
             clusters: &clusters[..len],
             choices,
             forced: false,
         };
-        let mut loss = round.count(pieces, 0);
+        let mut loss = round.count(pieces, 0)?;
         if loss == 0 || len > FREE_BELOW && loss < len / LEAST_SHARE {
             round.forced = true;
-            loss = round.count(pieces, 0);
+            loss = round.count(pieces, 0)?;
         }
         end -= loss;
         let pairs = &mut nodes[end..end + loss];
-        round.merge(pieces, 0, &mut merged[..len - loss], pairs, end as u32);
+        round.merge(pieces, 0, &mut merged[..len - loss], pairs, end as u32)?;
         std::mem::swap(clusters, merged);
         len -= loss;
         if let Some(progress) = &control.progress {
@@ -177,6 +179,7 @@ fn choose_block(clusters: &[Cluster], begin: usize, choices: &mut [i8]) {
 /// Clusters that have chosen.
 struct Round<'a> {
     model: &'a Model,
+    control: &'a BuildControl,
     clusters: &'a [Cluster],
     choices: &'a [i8],
     /// Whether neighbours merge too if neither is chosen by whom it chose.
@@ -205,8 +208,9 @@ impl Round<'_> {
 
     /// Counts what happens in each piece, the first of which is number `first`. Returns how many
     /// clusters merge into those before them.
-    fn count(&self, pieces: &mut [Piece], first: usize) -> usize {
+    fn count(&self, pieces: &mut [Piece], first: usize) -> Result<usize, BuildError> {
         if let [piece] = pieces {
+            self.control.check()?;
             let range = self.range(first, 1);
             *piece = Piece::default();
             for i in range {
@@ -214,7 +218,7 @@ impl Round<'_> {
                 piece.lasts += u32::from(other.is_some_and(|other| other < i));
                 piece.firsts += u32::from(other.is_some_and(|other| other > i));
             }
-            return piece.lasts as usize;
+            return Ok(piece.lasts as usize);
         }
         let middle = pieces.len() / 2;
         let (left, right) = pieces.split_at_mut(middle);
@@ -222,7 +226,7 @@ impl Round<'_> {
             || self.count(left, first),
             || self.count(right, first + middle),
         );
-        left + right
+        Ok(left? + right?)
     }
 
     /// The clusters of some pieces.
@@ -239,7 +243,7 @@ impl Round<'_> {
         merged: &mut [Cluster],
         nodes: &mut [Node],
         node: u32,
-    ) {
+    ) -> Result<(), BuildError> {
         if pieces.len() > 1 {
             let (left, right) = pieces.split_at(pieces.len() / 2);
             let lost: u32 = left.iter().map(|piece| piece.lasts).sum();
@@ -247,15 +251,16 @@ impl Round<'_> {
             let kept = self.range(first, left.len()).len() - lost as usize;
             let (merged_left, merged_right) = merged.split_at_mut(kept);
             let (nodes_left, nodes_right) = nodes.split_at_mut(new as usize);
-            tasks::join(
+            let (left, right) = tasks::join(
                 || self.merge(left, first, merged_left, nodes_left, node),
                 || {
                     let first = first + left.len();
-                    self.merge(right, first, merged_right, nodes_right, node + new);
+                    self.merge(right, first, merged_right, nodes_right, node + new)
                 },
             );
-            return;
+            return left.and(right);
         }
+        self.control.check()?;
         let (mut merged, mut nodes) = (merged.iter_mut(), (node..).zip(nodes));
         for i in self.range(first, 1) {
             let cluster = &self.clusters[i];
@@ -287,6 +292,7 @@ impl Round<'_> {
                 *place = cluster;
             }
         }
+        Ok(())
     }
 }
 
