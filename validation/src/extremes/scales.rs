@@ -27,6 +27,10 @@ fn on_lattice(v: Vec3) -> Vec3 {
     (v * 1_048_576.0).round() / 1_048_576.0
 }
 
+fn ray_on_lattice(ray: &Ray) -> Ray {
+    Ray::new(on_lattice(ray.origin), on_lattice(ray.direction))
+}
+
 /// A ray as it is in a scene of another scale: with its direction as it was, or scaled too.
 fn scaled(ray: &Ray, scale: f32, with_direction: bool) -> Ray {
     let direction = if with_direction { scale } else { 1.0 };
@@ -55,7 +59,7 @@ pub(super) fn scale(settings: &Settings, findings: &mut Findings) -> Result<(), 
         let rays: Vec<Ray> = [Aim::Anywhere, Aim::Vertices]
             .into_iter()
             .flat_map(|aim| rays_from_inside(&closed, aim, count, &mut sampler))
-            .map(|ray| Ray::new(on_lattice(ray.origin), on_lattice(ray.direction)))
+            .map(|ray| ray_on_lattice(&ray))
             .collect();
         for accuracy in ACCURACIES {
             let mut params = BuildParams::default();
@@ -153,10 +157,7 @@ fn range(findings: &mut Findings) -> Result<(), ExtremesError> {
     let mesh = meshes::mapped(&closed.mesh, on_lattice)?;
     let closed = ClosedMesh { mesh, ..closed };
     let rays = rays_from_inside(&closed, Aim::Vertices, 40, &mut Sampler::new(110));
-    let rays: Vec<Ray> = rays
-        .iter()
-        .map(|ray| Ray::new(on_lattice(ray.origin), on_lattice(ray.direction)))
-        .collect();
+    let rays: Vec<Ray> = rays.iter().map(ray_on_lattice).collect();
     for accuracy in ACCURACIES {
         let mut params = BuildParams::default();
         params.accuracy = accuracy;

@@ -198,4 +198,53 @@ mod tests {
         assert_eq!(offset_of!(Arguments, bvh), 48);
         assert_eq!(size_of::<Arguments>(), 136);
     }
+
+    /// The same against what bindgen makes of the headers of Embree 4: size, alignment, and the place of every field.
+    #[test]
+    #[cfg(feature = "embree4-sys")]
+    fn structs_have_the_layout_that_bindgen_finds() {
+        macro_rules! same_places {
+            ($own:ty, $other:ty: $($field:ident $(. $within:ident)* = $other_field:ident $(. $other_within:ident)*),* $(,)?) => {
+                $(assert_eq!(
+                    offset_of!($own, $field $(. $within)*),
+                    offset_of!($other, $other_field $(. $other_within)*),
+                    stringify!($other $other_field),
+                );)*
+            };
+        }
+        fn same_shape<A, B>() {
+            let of_b = (size_of::<B>(), align_of::<B>());
+            assert_eq!(
+                (size_of::<A>(), align_of::<A>()),
+                of_b,
+                "{}",
+                std::any::type_name::<B>()
+            );
+        }
+        use embree4_sys as header;
+        same_shape::<Primitive, header::RTCBuildPrimitive>();
+        same_places!(Primitive, header::RTCBuildPrimitive:
+            lower = lower_x, geometry_id = geomID, upper = upper_x, primitive_id = primID);
+        same_shape::<Bounds, header::RTCBounds>();
+        same_places!(Bounds, header::RTCBounds:
+            lower = lower_x, padding0 = align0, upper = upper_x, padding1 = align1);
+        same_shape::<RayRecord, header::RTCRay>();
+        same_places!(RayRecord, header::RTCRay:
+            origin = org_x, t_near = tnear, direction = dir_x, time = time, t_far = tfar, mask = mask, id = id,
+            flags = flags);
+        // Room for more at the end is on purpose.
+        assert!(size_of::<RayHit>() >= size_of::<header::RTCRayHit>());
+        same_places!(RayHit, header::RTCRayHit:
+            ray = ray, normal = hit.Ng_x, u = hit.u, v = hit.v, primitive_id = hit.primID, geometry_id = hit.geomID,
+            instance_ids = hit.instID);
+        same_shape::<Arguments, header::RTCBuildArguments>();
+        same_places!(Arguments, header::RTCBuildArguments:
+            byte_size = byteSize, quality = buildQuality, flags = buildFlags, branching_factor = maxBranchingFactor,
+            max_depth = maxDepth, sah_block_size = sahBlockSize, min_leaf_size = minLeafSize,
+            max_leaf_size = maxLeafSize, traversal_cost = traversalCost, intersection_cost = intersectionCost,
+            bvh = bvh, primitives = primitives, primitive_count = primitiveCount,
+            primitive_capacity = primitiveArrayCapacity, create_node = createNode,
+            set_node_children = setNodeChildren, set_node_bounds = setNodeBounds, create_leaf = createLeaf,
+            split_primitive = splitPrimitive, progress = buildProgress, user = userPtr);
+    }
 }
