@@ -158,7 +158,8 @@ mod tests {
     #[test]
     fn every_instruction_set_gives_the_same_bits_inside_the_tables() {
         let numbers = [0.0, -0.0, 0.5, 1.5, -2.5, 7.99, -1e6, 3e8];
-        for (x, y) in numbers.iter().flat_map(|x| numbers.map(|y| (*x, y))) {
+        let pairs = numbers.iter().flat_map(|x| numbers.map(|y| (*x, y)));
+        for (x, y) in pairs.step_by(if cfg!(miri) { 13 } else { 1 }) {
             // Far outside too: an index is limited before anything is read.
             for index in [0, 1, 2, 5, -1, i32::MAX, i32::MIN] {
                 let by = |isa| run(isa, Probe { x, y, index });
