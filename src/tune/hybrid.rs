@@ -204,10 +204,19 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         self
     }
 
-    /// The same run with parameters that are tried before the search proposes any, in this order.
+    /// The same run with parameters that are tried before the search proposes any, in this order. Values
+    /// that the space does not have are moved to the nearest, but a tree of another quality or width is
+    /// another tree: it is left out.
     #[must_use]
     pub fn with_starts(mut self, starts: &[BuildParams]) -> Self {
-        self.starts = starts.to_vec();
+        let kind = |params: &BuildParams| (params.quality, params.branching_factor);
+        let is_held = |start: &&BuildParams| {
+            // What cannot be built is an error of the first frame.
+            self.space
+                .config(start)
+                .map_or(true, |held| kind(&self.space.params(&held)) == kind(start))
+        };
+        self.starts = starts.iter().filter(is_held).copied().collect();
         self
     }
 

@@ -35,7 +35,7 @@ pub(crate) struct GainsArgs {
     /// Scenes: files or built-in ones
     #[arg(required = true)]
     scenes: Vec<String>,
-    /// Seeds of searches and pictures
+    /// Seeds of searches and pictures, with commas between
     #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 3, 4, 5])]
     seeds: Vec<u64>,
     /// Frames of a run
@@ -59,7 +59,7 @@ pub(crate) struct GainsArgs {
     /// Build candidates beside the frames, where trees serve any number of them (metric "render")
     #[arg(long)]
     background: bool,
-    /// What is made small
+    /// What is made small, with commas between
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Feedback::Render, Feedback::Total])]
     metrics: Vec<Feedback>,
     /// The axes: those of the paper's eleven parameters, or all that change no pixel

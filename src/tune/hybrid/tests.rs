@@ -97,6 +97,19 @@ fn hybrid<'p, C: Clock>(
         .with_overhead_limit(f64::INFINITY)
 }
 
+#[test]
+fn starts_of_a_kind_that_the_space_lacks_are_left_out() {
+    let (place, base) = (place("interior"), BuildParams::default());
+    let space = ParameterSpace::new(&base, &[], SpaceAxes::Eleven).unwrap();
+    let starts = portfolio(&base, Metric::Total);
+    let mut run = hybrid(&place, Metric::Total, &base, WallClock::start());
+    run.space = space;
+    let kept = run.with_starts(&starts).starts;
+    assert!(kept.len() >= 2 && kept.len() < starts.len());
+    assert!(kept.iter().all(|kept| starts.contains(kept)));
+    assert!(kept.iter().all(|kept| kept.branching_factor <= 8));
+}
+
 /// The same frames by one tree.
 fn plain(place: &Place, frames: u32) -> Film {
     let settings = settings(Metric::Render);
