@@ -31,7 +31,7 @@ pub fn portfolio(base: &BuildParams, metric: Metric) -> Vec<BuildParams> {
         params
     };
     let wide = with_costs(with(Quality::Agglomerative, 16, [2, 14], 4), 1, 0.05);
-    // `BuildParams::sixteen_children`: hardly any random configuration of the recordings is like it, and it takes no
+    // `BuildParams::sixteen_children`: hardly any random configuration of the recordings is like it, and it takes little
     // longer to build than the default.
     let sixteen = with_costs(with(Quality::BinnedSah, 16, [4, 28], 0), 4, 0.5);
     let few_frames = metric
