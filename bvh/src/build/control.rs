@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Ranges of at least so many references ask whether to go on: some hundred microseconds of work.
-pub(crate) const CHECK_SIZE: usize = 1024;
+const CHECK_SIZE: usize = 1024;
 
 /// Ranges below this are reported as a whole.
 const REPORT_SIZE: usize = 4096;
@@ -72,6 +72,11 @@ impl<'a> Running<'a> {
         self.control.check()
     }
 
+    /// Asks whether to go on, if the range is long.
+    pub(crate) fn check_range(&self, n: usize) -> Result<(), BuildError> {
+        self.control.check_range(n)
+    }
+
     /// Reports a finished range of `n` references within one of `parent`; the counts of cut
     /// primitives may pass the total, which is then reported.
     pub(crate) fn finished(&self, n: usize, parent: usize) {
@@ -86,6 +91,14 @@ impl<'a> Running<'a> {
 }
 
 impl BuildControl {
+    /// Asks whether to go on, if the range is long.
+    pub(crate) fn check_range(&self, n: usize) -> Result<(), BuildError> {
+        if n >= CHECK_SIZE {
+            self.check()?;
+        }
+        Ok(())
+    }
+
     pub(crate) fn check(&self) -> Result<(), BuildError> {
         match &self.cancelled {
             Some(cancelled) if cancelled.load(Ordering::Relaxed) => Err(BuildError::Cancelled),

@@ -13,7 +13,7 @@ use wide::f32x4;
 use super::{
     BuildWorkspace, LeafReference,
     binning::Rounding,
-    control::{CHECK_SIZE, Running},
+    control::Running,
     curve::{self, spread_bits},
     introsort,
     primitive::{Bounds, PrimitiveRef},
@@ -153,9 +153,7 @@ impl<R: Rounding> Builder<'_, R> {
 
     fn subtree(&self, range: Range<'_>, level: u32) -> Result<Record, BuildError> {
         let n = range.keys.len();
-        if n >= CHECK_SIZE {
-            self.running.check()?;
-        }
+        self.running.check_range(n)?;
         let leaves = n.div_ceil(self.params.max_leaf_size as usize);
         let at_limit = level + RESERVED_LEVELS >= self.params.max_depth
             || !R::LIBRARY_ORDER

@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::{
     BuildWorkspace, LeafReference,
     binning::{self, Rounding},
-    control::{CHECK_SIZE, Running},
+    control::Running,
     introsort, partition,
     primitive::{PrimitiveRef, RangeBounds},
     record::Record,
@@ -367,14 +367,6 @@ struct Builder<'a, R, C> {
 }
 
 impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
-    /// Whether to go on, if the range is long.
-    fn check(&self, n: usize) -> Result<(), BuildError> {
-        if n >= CHECK_SIZE {
-            self.running.check()?;
-        }
-        Ok(())
-    }
-
     fn find_split(
         &self,
         of: &Subtree<'_>,
@@ -382,7 +374,7 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         memory: &mut Memory,
     ) -> Result<Option<Split>, BuildError> {
         let (references, bounds) = (of.references(span), &span.bounds);
-        self.check(span.len)?;
+        self.running.check_range(span.len)?;
         let room = span.capacity - span.len;
         let object = binning::find_split::<R>(
             references,

@@ -62,7 +62,7 @@ pub(crate) struct GainsArgs {
     /// What is made small, with commas between
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Feedback::Render, Feedback::Total])]
     metrics: Vec<Feedback>,
-    /// The axes: those of the paper's eleven parameters, or all that change no pixel
+    /// The axes, with commas between: those of the paper's eleven parameters, or all that change no pixel
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Axes::Eleven, Axes::Wide])]
     spaces: Vec<Axes>,
     /// A row for each run, as CSV

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{
     super::{
         LeafReference,
-        control::{BuildControl, CHECK_SIZE},
+        control::BuildControl,
         primitive::Bounds,
         record::Record,
         recursion::{MAX_CHILDREN, depth_error, levels_below},
@@ -31,7 +31,7 @@ impl Emission<'_> {
     pub(super) fn node(&mut self, index: u32, level: u32) -> Result<Record, BuildError> {
         let params = &self.model.params;
         let node = &self.nodes[index as usize];
-        self.check(node.summary.references)?;
+        self.control.check_range(node.summary.references as usize)?;
         let Below::Children(children) = node.below else {
             return self.by_number(index, level);
         };
@@ -47,14 +47,6 @@ impl Emission<'_> {
         let bounds = Bounds::of_aabb(&node.bounds);
         let records = &self.records[first..first + len];
         Ok(Record::inner(&bounds, first, records))
-    }
-
-    /// Whether to go on, if there are many references.
-    fn check(&self, references: u32) -> Result<(), BuildError> {
-        if references as usize >= CHECK_SIZE {
-            self.control.check()?;
-        }
-        Ok(())
     }
 
     /// Replaces nodes by their children, the largest first, until a wide node is full.
@@ -124,7 +116,7 @@ impl Emission<'_> {
         let params = &self.model.params;
         let (width, max_leaf_size) = (params.branching_factor as usize, params.max_leaf_size);
         let references = self.references(&range);
-        self.check(references)?;
+        self.control.check_range(references as usize)?;
         if level > params.max_depth {
             return Err(depth_error(params, references as usize, level));
         }

@@ -204,9 +204,9 @@ mod tests {
     #[cfg(feature = "embree4-sys")]
     fn structs_have_the_layout_that_bindgen_finds() {
         macro_rules! same_places {
-            ($own:ty, $other:ty: $($field:ident $(. $within:ident)* = $other_field:ident $(. $other_within:ident)*),* $(,)?) => {
+            ($own:ty, $other:ty: $($field:ident = $other_field:ident $(. $other_within:ident)*),* $(,)?) => {
                 $(assert_eq!(
-                    offset_of!($own, $field $(. $within)*),
+                    offset_of!($own, $field),
                     offset_of!($other, $other_field $(. $other_within)*),
                     stringify!($other $other_field),
                 );)*
