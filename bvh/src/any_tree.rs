@@ -20,6 +20,7 @@ use crate::{
         fast::Fast,
         kernel::{Candidate, Count, RaySetup},
         robust::Robust,
+        stream::Waiting,
     },
 };
 
@@ -101,6 +102,17 @@ impl AnyTree {
     pub(crate) fn any<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> bool {
         for_width!(self, tree => tree.any(isa, ray, count))
     }
+
+    #[inline]
+    pub(crate) fn stream<const ANY: bool>(
+        &self,
+        isa: Isa,
+        batch: Waiting<'_>,
+        in_flight: usize,
+        tell: impl FnMut(usize, &Candidate, &RaySetup),
+    ) {
+        for_width!(self, tree => tree.stream::<ANY>(isa, batch, in_flight, tell))
+    }
 }
 
 impl<const N: usize, const W: usize> Formatted<N, W>
@@ -172,6 +184,27 @@ where
             Self::Robust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
             Self::CompactFast(tree) => any::<N, W, _, Fast, C>(isa, tree, ray, count),
             Self::CompactRobust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
+        }
+    }
+
+    #[inline]
+    fn stream<const ANY: bool>(
+        &self,
+        isa: Isa,
+        batch: Waiting<'_>,
+        in_flight: usize,
+        tell: impl FnMut(usize, &Candidate, &RaySetup),
+    ) {
+        use dispatch::stream;
+        match self {
+            Self::Fast(tree) => stream::<ANY, N, W, _, Fast>(isa, tree, batch, in_flight, tell),
+            Self::Robust(tree) => stream::<ANY, N, W, _, Robust>(isa, tree, batch, in_flight, tell),
+            Self::CompactFast(tree) => {
+                stream::<ANY, N, W, _, Fast>(isa, tree, batch, in_flight, tell);
+            }
+            Self::CompactRobust(tree) => {
+                stream::<ANY, N, W, _, Robust>(isa, tree, batch, in_flight, tell);
+            }
         }
     }
 }

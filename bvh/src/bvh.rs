@@ -20,7 +20,10 @@ use crate::{
     ray::{Hit, Ray, Work},
     simd::Isa,
     stats::TreeStats,
-    traverse::kernel::{Candidate, Count, RaySetup, power_of_two_below},
+    traverse::{
+        kernel::{Candidate, Count, RaySetup, power_of_two_below},
+        stream::{self, Waiting},
+    },
 };
 
 /// Largest coordinates outside this range are refused.
@@ -265,6 +268,41 @@ impl Bvh {
     #[must_use]
     pub fn any_hit_with_work(&self, ray: &Ray, work: &mut Work) -> bool {
         self.any_hit_counted(ray, work)
+    }
+
+    /// The closest hits of many rays, `hits[i]` becoming that of `rays[i]`: those of
+    /// [`Bvh::closest_hit`] to the last bit, found with several rays in flight on this core, which
+    /// take their turns while memory is waited for.
+    ///
+    /// `in_flight` is limited to 1..=[`Bvh::MAX_IN_FLIGHT`]. What is best depends on scene and rays:
+    /// 8 often serves rays that go in all directions, 1 those that go side by side.
+    pub fn closest_hits(&self, rays: &[Ray], in_flight: usize, hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        self.stream::<false>(rays, in_flight, |place, candidate, setup| {
+            hits[place] = Some(hit_of(candidate, setup, &self.first_ids));
+        });
+    }
+
+    /// Whether each of many rays hits anything; otherwise as [`Bvh::closest_hits`].
+    pub fn any_hits(&self, rays: &[Ray], in_flight: usize, are_hit: &mut Vec<bool>) {
+        are_hit.clear();
+        are_hit.resize(rays.len(), false);
+        self.stream::<true>(rays, in_flight, |place, _, _| are_hit[place] = true);
+    }
+
+    /// The most rays that a core has in flight.
+    pub const MAX_IN_FLIGHT: usize = stream::MAX_IN_FLIGHT;
+
+    fn stream<const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        in_flight: usize,
+        tell: impl FnMut(usize, &Candidate, &RaySetup),
+    ) {
+        let in_flight = in_flight.clamp(1, Self::MAX_IN_FLIGHT);
+        let batch = Waiting::new(rays, self.scale);
+        self.tree.stream::<ANY>(self.isa, batch, in_flight, tell);
     }
 
     /// The smallest box around all triangles; empty if there are none.

@@ -69,6 +69,9 @@ fn check(
     let mut hits = 0;
     for accuracy in ACCURACIES {
         let trees = trees(meshes, params, accuracy);
+        for tree in &trees {
+            check_streams(tree, rays)?;
+        }
         for ray in rays {
             let expected = bits(reference::closest_hit(meshes, ray, accuracy).unwrap());
             hits += usize::from(expected.is_some());
@@ -91,6 +94,22 @@ fn check(
         }
     }
     Ok(hits)
+}
+
+/// Compares rays in flight together with one at a time.
+fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
+    let (mut hits, mut are_hit) = (vec![], vec![]);
+    for in_flight in [1, 3, Bvh::MAX_IN_FLIGHT] {
+        let context = format!("{} {:?} {in_flight} in flight", tree.isa(), tree.params());
+        tree.closest_hits(rays, in_flight, &mut hits);
+        let hits: Vec<_> = hits.iter().map(|&hit| bits(hit)).collect();
+        let alone: Vec<_> = rays.iter().map(|ray| bits(tree.closest_hit(ray))).collect();
+        prop_assert_eq!(hits, alone, "{}", context);
+        tree.any_hits(rays, in_flight, &mut are_hit);
+        let alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
+        prop_assert_eq!(&are_hit, &alone, "{}", context);
+    }
+    Ok(())
 }
 
 /// Whether triangles may be cut.

@@ -1,6 +1,8 @@
 //! Rays through the trees: ours by our traversal, Embree's by its own. Ours have nodes of eight as
 //! Embree's, and of sixteen; the goals are about the width that one register holds.
 
+use std::{cell::RefCell, rc::Rc};
+
 use raywright_benches::{
     clock::Clock,
     goals::Goals,
@@ -21,6 +23,8 @@ const OPTIMIZED_GOAL: f64 = 1.15;
 const BINNED_GOAL: f64 = 0.9;
 const BINNED_SCENE: &str = "sponza";
 const WIDTHS: [u32; 2] = [8, 16];
+/// How many rays are in flight together where several are.
+const IN_FLIGHT: [usize; 3] = [4, 8, 16];
 /// Rays that may differ: hits at edges are decided by rounding.
 const DIFFERENT_GOAL: f64 = 2e-4;
 
@@ -67,7 +71,7 @@ impl Summary {
             embree(device, scene, BuildQuality::High, ""),
             embree(device, scene, BuildQuality::Medium, " again"),
         ];
-        let mut places = Vec::new();
+        let (mut places, mut streams) = (Vec::new(), Vec::new());
         for quality in [
             Quality::BinnedSah,
             Quality::SpatialSplits,
@@ -85,12 +89,15 @@ impl Summary {
                 match Bvh::build(&[&scene.mesh], &params) {
                     Ok(tree) => {
                         places.push(((quality, width), engines.len()));
-                        engines.push(ours(tree));
+                        let tree = Rc::new(tree);
+                        engines.push(ours(tree.clone()));
+                        streams.extend(IN_FLIGHT.map(|n| ours_in_flight(tree.clone(), n)));
                     }
                     Err(error) => println!("\nno rays through {quality:?}, {width}: {error}"),
                 }
             }
         }
+        engines.append(&mut streams);
         let key = |quality| (quality, judged_width());
         let place = |quality| places.iter().find(|p| p.0 == key(quality)).map(|p| p.1);
         for set in sets {
@@ -236,16 +243,38 @@ fn differs(got: f32, expected: f32) -> bool {
     got.is_finite() != expected.is_finite() || (got - expected).abs() > 1e-4 * expected.abs()
 }
 
-fn ours<'a>(tree: Bvh) -> Engine<'a> {
-    let tree = std::rc::Rc::new(tree);
+fn name_of(tree: &Bvh) -> String {
+    let params = tree.params();
+    let (quality, children) = (params.quality, params.branching_factor);
+    format!("raywright {quality:?}, {children} children, {}", tree.isa())
+}
+
+fn ours_in_flight<'a>(tree: Rc<Bvh>, in_flight: usize) -> Engine<'a> {
+    let any = tree.clone();
+    let (hits, are_hit) = (RefCell::new(vec![]), RefCell::new(vec![]));
+    Engine {
+        name: format!("{}, {in_flight} in flight", name_of(&tree)),
+        closest: Box::new(move |rays, answers| {
+            let hits = &mut *hits.borrow_mut();
+            tree.closest_hits(rays, in_flight, hits);
+            for (hit, answer) in hits.iter().zip(answers) {
+                *answer = hit.map_or(f32::INFINITY, |hit| hit.t);
+            }
+        }),
+        any: Box::new(move |rays, answers| {
+            let are_hit = &mut *are_hit.borrow_mut();
+            any.any_hits(rays, in_flight, are_hit);
+            for (&is_hit, answer) in are_hit.iter().zip(answers) {
+                *answer = f32::from(u8::from(is_hit));
+            }
+        }),
+    }
+}
+
+fn ours<'a>(tree: Rc<Bvh>) -> Engine<'a> {
     let any = tree.clone();
     Engine {
-        name: format!(
-            "raywright {:?}, {} children, {}",
-            tree.params().quality,
-            tree.params().branching_factor,
-            tree.isa()
-        ),
+        name: name_of(&tree),
         closest: Box::new(move |rays, answers| {
             for (ray, answer) in rays.iter().zip(answers) {
                 *answer = tree.closest_hit(ray).map_or(f32::INFINITY, |hit| hit.t);
@@ -270,7 +299,7 @@ fn embree<'a>(
         .scene(&[&scene.mesh], &settings)
         .and_then(|scene| scene.commit())
         .expect("a scene");
-    let scene = std::rc::Rc::new(scene);
+    let scene = Rc::new(scene);
     let any = scene.clone();
     Engine {
         name: format!("Embree {quality:?}{note}"),

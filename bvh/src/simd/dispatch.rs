@@ -14,6 +14,7 @@ use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
         kernel::{self, Candidate, Count, RaySetup},
+        stream::{self, Waiting},
         triangle::TriangleTest,
     },
 };
@@ -133,10 +134,61 @@ pub(crate) fn all<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
     }
 }
 
-/// The three entries of an instruction set.
+/// Traces a batch of rays with a tree, several in flight.
+#[inline]
+pub(crate) fn stream<
+    const ANY: bool,
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+>(
+    isa: Isa,
+    tree: &Tree<N, W, B>,
+    batch: Waiting<'_>,
+    in_flight: usize,
+    tell: impl FnMut(usize, &Candidate, &RaySetup),
+) where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx2 => unsafe { stream_avx2::<ANY, N, W, B, A, _>(tree, batch, in_flight, tell) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`.
+        Isa::Avx512 => unsafe { stream_avx512::<ANY, N, W, B, A, _>(tree, batch, in_flight, tell) },
+        _ => stream::trace::<ANY, N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(
+            tree, batch, in_flight, tell,
+        ),
+    }
+}
+
+/// The four entries of an instruction set.
 #[cfg(target_arch = "x86_64")]
 macro_rules! entries {
-    ($closest:ident, $any:ident, $all:ident, $lanes:ident, $features:literal) => {
+    ($closest:ident, $any:ident, $all:ident, $stream:ident, $lanes:ident, $features:literal) => {
+        #[target_feature(enable = $features)]
+        fn $stream<
+            const ANY: bool,
+            const N: usize,
+            const W: usize,
+            B: Block,
+            A: TriangleTest<B>,
+            F: FnMut(usize, &Candidate, &RaySetup),
+        >(
+            tree: &Tree<N, W, B>,
+            batch: Waiting<'_>,
+            in_flight: usize,
+            tell: F,
+        ) where
+            Widths: Width<N>,
+        {
+            stream::trace::<ANY, N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(
+                tree, batch, in_flight, tell,
+            );
+        }
+
         #[target_feature(enable = $features)]
         fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
             tree: &Tree<N, W, B>,
@@ -184,6 +236,7 @@ entries!(
     closest_avx2,
     any_avx2,
     all_avx2,
+    stream_avx2,
     Avx2,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
 );
@@ -193,6 +246,7 @@ entries!(
     closest_avx512,
     any_avx512,
     all_avx512,
+    stream_avx512,
     Avx512,
     "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"
 );

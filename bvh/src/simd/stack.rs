@@ -72,6 +72,20 @@ impl<const N: usize> Stack<N> {
         self.top += count as usize;
     }
 
+    /// Forgets all entries.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.top = 0;
+    }
+
+    /// The reference of the top entry.
+    #[inline(always)]
+    pub(crate) fn peek(&self) -> Option<u32> {
+        let at = self.top.checked_sub(1)?.min(Self::CAPACITY - 1);
+        // SAFETY: as in `pop`.
+        unsafe { Some(self.references.as_flattened()[at].assume_init()) }
+    }
+
     /// Takes the top entry: its reference and its distance.
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<(u32, f32)> {

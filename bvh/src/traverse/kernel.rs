@@ -102,6 +102,12 @@ impl RaySetup {
         })
     }
 
+    /// Bit a is set if the direction is negative along axis a.
+    #[inline(always)]
+    pub(super) fn octant(&self) -> usize {
+        self.octant
+    }
+
     /// A distance along the scaled ray in the caller's unit.
     #[inline]
     pub(crate) fn unscaled(&self, t: f32) -> f32 {
@@ -166,7 +172,7 @@ impl Count for Work {
 }
 
 /// A ray in lanes of children.
-struct BoxLanes<L> {
+pub(super) struct BoxLanes<L> {
     reciprocal: [L; 3],
     near_addend: [L; 3],
     far_addend: [L; 3],
@@ -176,7 +182,7 @@ struct BoxLanes<L> {
 
 impl<L> BoxLanes<L> {
     #[inline(always)]
-    fn new<const N: usize>(ray: &RaySetup, margin: [f32; 3]) -> Self
+    pub(super) fn new<const N: usize>(ray: &RaySetup, margin: [f32; 3]) -> Self
     where
         L: Lanes<N>,
     {
@@ -217,7 +223,7 @@ impl<L> BoxLanes<L> {
 
     /// Distances at which the boxes of a node are entered, and one bit per box that is.
     #[inline(always)]
-    fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
+    pub(super) fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
     where
         L: Lanes<N>,
     {
@@ -277,13 +283,7 @@ pub(crate) fn closest<
 ) -> Option<Candidate> {
     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
-    let mut best = Best {
-        t: ray.t_max,
-        u: 0.0,
-        v: 0.0,
-        den: 1.0,
-        id: u32::MAX,
-    };
+    let mut best = Best::none(ray.t_max);
     let mut stack = Stack::<N>::new();
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
@@ -314,17 +314,12 @@ pub(crate) fn closest<
             }
         }
     }
-    (best.id != u32::MAX).then(|| Candidate {
-        u: best.u / best.den,
-        v: best.v / best.den,
-        t: best.t,
-        id: best.id,
-    })
+    best.candidate()
 }
 
 /// The first hit so far; its weights are still to be divided by `den`.
-struct Best {
-    t: f32,
+pub(super) struct Best {
+    pub(super) t: f32,
     u: f32,
     v: f32,
     den: f32,
@@ -332,9 +327,31 @@ struct Best {
 }
 
 impl Best {
+    /// No hit up to a distance.
+    #[inline(always)]
+    pub(super) fn none(t_max: f32) -> Self {
+        Self {
+            t: t_max,
+            u: 0.0,
+            v: 0.0,
+            den: 1.0,
+            id: u32::MAX,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn candidate(&self) -> Option<Candidate> {
+        (self.id != u32::MAX).then(|| Candidate {
+            u: self.u / self.den,
+            v: self.v / self.den,
+            t: self.t,
+            id: self.id,
+        })
+    }
+
     /// Takes over the lanes that precede it.
     #[inline(always)]
-    fn keep_first<T: Lanes<4>>(&mut self, hits: &BlockHits<T>, ids: &[u32; 4]) {
+    pub(super) fn keep_first<T: Lanes<4>>(&mut self, hits: &BlockHits<T>, ids: &[u32; 4]) {
         let (t, u, v, den) = (
             hits.t.store(),
             hits.u.store(),

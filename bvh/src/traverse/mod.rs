@@ -5,4 +5,5 @@ pub(crate) mod fast;
 pub(crate) mod kernel;
 pub mod reference;
 pub(crate) mod robust;
+pub(crate) mod stream;
 pub(crate) mod triangle;

@@ -1,0 +1,198 @@
+//! Traversal by several rays in turns: while one waits for a node or a block that it asked for, the
+//! others work. After the streams of Embree and of Barringer, Akenine-Möller, *Dynamic Ray Stream
+//! Traversal*, 2014, but without any sorting: the rays share nothing.
+//!
+//! Invariants: each ray visits what it would visit alone, but for the child that a single ray goes
+//! down to at once and that lies on the stack here; whether and where it hits is a function of ray
+//! and triangles alone (see `kernel`), so that answers are those of one ray at a time to the last
+//! bit, however many are in flight and in whatever order they come.
+
+use super::{
+    kernel::{Best, BoxLanes, Candidate, RaySetup},
+    triangle::TriangleTest,
+};
+use crate::{
+    layout::{
+        block::Block,
+        node::{ChildRef, Node},
+        tree::Tree,
+    },
+    ray::Ray,
+    simd::{Lanes, PushChildren, prefetch, stack::Stack},
+};
+
+/// Most rays in flight: more than a core can have in its queues of misses.
+pub(crate) const MAX_IN_FLIGHT: usize = 32;
+
+/// The rays of a batch that have not begun.
+pub(crate) struct Waiting<'a> {
+    rays: &'a [Ray],
+    scale: f32,
+    next: usize,
+}
+
+impl<'a> Waiting<'a> {
+    /// Rays for a tree whose coordinates are those of the caller times `scale`.
+    pub(crate) fn new(rays: &'a [Ray], scale: f32) -> Self {
+        Self {
+            rays,
+            scale,
+            next: 0,
+        }
+    }
+
+    /// The next ray that can hit anything, with its place in the batch.
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, RaySetup)> {
+        while let Some(ray) = self.rays.get(self.next) {
+            let place = self.next;
+            self.next += 1;
+            if let Some(setup) = RaySetup::new(ray, self.scale) {
+                return Some((place, setup));
+            }
+        }
+        None
+    }
+}
+
+/// A ray on its way.
+struct Traveller<const N: usize, L, P> {
+    /// Its place in the batch.
+    place: usize,
+    ray: RaySetup,
+    boxes: BoxLanes<L>,
+    prepared: P,
+    best: Best,
+    stack: Stack<N>,
+}
+
+impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
+    /// Begins with another ray.
+    #[inline(always)]
+    fn restart<B, A, T>(&mut self, place: usize, ray: RaySetup)
+    where
+        A: TriangleTest<B, Ray<T> = P>,
+        T: Lanes<4>,
+    {
+        self.place = place;
+        self.boxes = BoxLanes::new(&ray, A::margin(&ray));
+        self.prepared = A::prepare::<T>(&ray);
+        self.best = Best::none(ray.t_max);
+        self.stack.clear();
+        self.stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        self.ray = ray;
+    }
+
+    /// Visits the nearest place of the stack. False when nothing is left to be found.
+    #[inline(always)]
+    fn step<const ANY: bool, const W: usize, B, A, T>(&mut self, tree: &Tree<N, W, B>) -> bool
+    where
+        B: Block,
+        A: TriangleTest<B, Ray<T> = P>,
+        T: Lanes<4>,
+    {
+        let reference = loop {
+            let Some((reference, distance)) = self.stack.pop() else {
+                return false;
+            };
+            if distance <= self.best.t {
+                break ChildRef(reference);
+            }
+        };
+        if reference.is_leaf() {
+            for block in &tree.blocks[reference.blocks()] {
+                let hits = A::test(&self.ray, &self.prepared, block, &tree.points, self.best.t);
+                if hits.mask != 0 {
+                    self.best.keep_first(&hits, block.ids());
+                    if ANY {
+                        return false;
+                    }
+                }
+            }
+        } else {
+            let node = &tree.nodes[reference.0 as usize];
+            let (enter, mask) = self.boxes.test(node, self.best.t);
+            if mask != 0 {
+                let order = node.order(self.ray.octant());
+                enter.push_children(mask, &node.children, order, &mut self.stack);
+            }
+        }
+        if let Some(next) = self.stack.peek() {
+            ask_for(tree, ChildRef(next));
+        }
+        true
+    }
+}
+
+/// Asks for what is behind a reference.
+#[inline(always)]
+fn ask_for<const N: usize, const W: usize, B>(tree: &Tree<N, W, B>, reference: ChildRef) {
+    if reference.is_leaf() {
+        if let Some(block) = tree.blocks.get(reference.blocks().start) {
+            prefetch(block);
+        }
+    } else if let Some(node) = tree.nodes.get(reference.0 as usize) {
+        // A plane of eight children is half a line.
+        for planes in node.planes.chunks_exact(2) {
+            prefetch(&planes[0]);
+        }
+        prefetch(&node.children);
+    }
+}
+
+/// Traces all rays of a batch, at most `in_flight` at once, and tells of each that hits something,
+/// with its place in the batch, in no certain order. With `ANY` the hit is any.
+#[inline(always)]
+pub(crate) fn trace<
+    const ANY: bool,
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: PushChildren<N>,
+    T: Lanes<4>,
+>(
+    tree: &Tree<N, W, B>,
+    mut waiting: Waiting<'_>,
+    in_flight: usize,
+    mut tell: impl FnMut(usize, &Candidate, &RaySetup),
+) {
+    if tree.nodes.is_empty() {
+        return;
+    }
+    let mut travellers: Vec<Traveller<N, L, A::Ray<T>>> = Vec::with_capacity(in_flight);
+    while travellers.len() < in_flight {
+        let Some((place, ray)) = waiting.next() else {
+            break;
+        };
+        travellers.push(Traveller {
+            place,
+            boxes: BoxLanes::new(&ray, A::margin(&ray)),
+            prepared: A::prepare::<T>(&ray),
+            best: Best::none(ray.t_max),
+            stack: Stack::new(),
+            ray,
+        });
+        if let Some(traveller) = travellers.last_mut() {
+            traveller.stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        }
+    }
+    while !travellers.is_empty() {
+        let mut turn = 0;
+        while let Some(traveller) = travellers.get_mut(turn) {
+            if traveller.step::<ANY, W, B, A, T>(tree) {
+                turn += 1;
+                continue;
+            }
+            if let Some(hit) = traveller.best.candidate() {
+                tell(traveller.place, &hit, &traveller.ray);
+            }
+            if let Some((place, ray)) = waiting.next() {
+                traveller.restart::<B, A, T>(place, ray);
+                turn += 1;
+            } else {
+                travellers.swap_remove(turn);
+            }
+        }
+    }
+}
