@@ -46,6 +46,7 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
+    in_flight: usize,
     last_refit: Option<Refit>,
 }
 
@@ -144,6 +145,7 @@ impl Bvh {
             bounds,
             params: *params,
             isa: Isa::best(),
+            in_flight: 1,
             last_refit: None,
         })
     }
@@ -236,6 +238,27 @@ impl Bvh {
         Ok(())
     }
 
+    /// The most rays that a core has in flight.
+    pub const MAX_IN_FLIGHT: usize = stream::MAX_IN_FLIGHT;
+
+    /// The same tree, traced with so many rays of a batch in flight on a core, 1 to
+    /// [`Bvh::MAX_IN_FLIGHT`]; others are taken for the nearest of these. It changes no hit. What is
+    /// fastest depends on scene and rays: several often serve rays that go in all directions and
+    /// wait for memory, 1 those that go side by side.
+    #[must_use]
+    pub fn with_in_flight(self, in_flight: usize) -> Self {
+        Self {
+            in_flight: in_flight.clamp(1, Self::MAX_IN_FLIGHT),
+            ..self
+        }
+    }
+
+    /// How many rays of a batch are in flight on a core: 1 unless it was told otherwise.
+    #[must_use]
+    pub fn in_flight(&self) -> usize {
+        self.in_flight
+    }
+
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine
     /// does not have it.
     #[must_use]
@@ -272,37 +295,30 @@ impl Bvh {
 
     /// The closest hits of many rays, `hits[i]` becoming that of `rays[i]`: those of
     /// [`Bvh::closest_hit`] to the last bit, found with several rays in flight on this core, which
-    /// take their turns while memory is waited for.
-    ///
-    /// `in_flight` is limited to 1..=[`Bvh::MAX_IN_FLIGHT`]. What is best depends on scene and rays:
-    /// 8 often serves rays that go in all directions, 1 those that go side by side.
-    pub fn closest_hits(&self, rays: &[Ray], in_flight: usize, hits: &mut Vec<Option<Hit>>) {
+    /// take their turns while memory is waited for ([`Bvh::with_in_flight`]).
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
-        self.stream::<false>(rays, in_flight, |place, candidate, setup| {
+        self.stream::<false>(rays, |place, candidate, setup| {
             hits[place] = Some(hit_of(candidate, setup, &self.first_ids));
         });
     }
 
     /// Whether each of many rays hits anything; otherwise as [`Bvh::closest_hits`].
-    pub fn any_hits(&self, rays: &[Ray], in_flight: usize, are_hit: &mut Vec<bool>) {
+    pub fn any_hits(&self, rays: &[Ray], are_hit: &mut Vec<bool>) {
         are_hit.clear();
         are_hit.resize(rays.len(), false);
-        self.stream::<true>(rays, in_flight, |place, _, _| are_hit[place] = true);
+        self.stream::<true>(rays, |place, _, _| are_hit[place] = true);
     }
-
-    /// The most rays that a core has in flight.
-    pub const MAX_IN_FLIGHT: usize = stream::MAX_IN_FLIGHT;
 
     fn stream<const ANY: bool>(
         &self,
         rays: &[Ray],
-        in_flight: usize,
         tell: impl FnMut(usize, &Candidate, &RaySetup),
     ) {
-        let in_flight = in_flight.clamp(1, Self::MAX_IN_FLIGHT);
         let batch = Waiting::new(rays, self.scale);
-        self.tree.stream::<ANY>(self.isa, batch, in_flight, tell);
+        self.tree
+            .stream::<ANY>(self.isa, batch, self.in_flight, tell);
     }
 
     /// The smallest box around all triangles; empty if there are none.

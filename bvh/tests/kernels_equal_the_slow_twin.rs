@@ -101,11 +101,12 @@ fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
     let (mut hits, mut are_hit) = (vec![], vec![]);
     for in_flight in [1, 3, Bvh::MAX_IN_FLIGHT] {
         let context = format!("{} {:?} {in_flight} in flight", tree.isa(), tree.params());
-        tree.closest_hits(rays, in_flight, &mut hits);
+        let tree = tree.clone().with_in_flight(in_flight);
+        tree.closest_hits(rays, &mut hits);
         let hits: Vec<_> = hits.iter().map(|&hit| bits(hit)).collect();
         let alone: Vec<_> = rays.iter().map(|ray| bits(tree.closest_hit(ray))).collect();
         prop_assert_eq!(hits, alone, "{}", context);
-        tree.any_hits(rays, in_flight, &mut are_hit);
+        tree.any_hits(rays, &mut are_hit);
         let alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
         prop_assert_eq!(&are_hit, &alone, "{}", context);
     }

@@ -91,7 +91,7 @@ impl Summary {
                         places.push(((quality, width), engines.len()));
                         let tree = Rc::new(tree);
                         engines.push(ours(tree.clone()));
-                        streams.extend(IN_FLIGHT.map(|n| ours_in_flight(tree.clone(), n)));
+                        streams.extend(IN_FLIGHT.map(|n| ours_in_flight(&tree, n)));
                     }
                     Err(error) => println!("\nno rays through {quality:?}, {width}: {error}"),
                 }
@@ -249,21 +249,22 @@ fn name_of(tree: &Bvh) -> String {
     format!("raywright {quality:?}, {children} children, {}", tree.isa())
 }
 
-fn ours_in_flight<'a>(tree: Rc<Bvh>, in_flight: usize) -> Engine<'a> {
+fn ours_in_flight<'a>(tree: &Bvh, in_flight: usize) -> Engine<'a> {
+    let tree = Rc::new(tree.clone().with_in_flight(in_flight));
     let any = tree.clone();
     let (hits, are_hit) = (RefCell::new(vec![]), RefCell::new(vec![]));
     Engine {
         name: format!("{}, {in_flight} in flight", name_of(&tree)),
         closest: Box::new(move |rays, answers| {
             let hits = &mut *hits.borrow_mut();
-            tree.closest_hits(rays, in_flight, hits);
+            tree.closest_hits(rays, hits);
             for (hit, answer) in hits.iter().zip(answers) {
                 *answer = hit.map_or(f32::INFINITY, |hit| hit.t);
             }
         }),
         any: Box::new(move |rays, answers| {
             let are_hit = &mut *are_hit.borrow_mut();
-            any.any_hits(rays, in_flight, are_hit);
+            any.any_hits(rays, are_hit);
             for (&is_hit, answer) in are_hit.iter().zip(answers) {
                 *answer = f32::from(u8::from(is_hit));
             }

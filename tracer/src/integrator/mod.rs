@@ -4,6 +4,7 @@
 pub(crate) mod naive;
 pub(crate) mod path;
 pub(crate) mod view;
+pub(crate) mod wave;
 
 pub use view::View;
 
