@@ -223,7 +223,11 @@ impl<L> BoxLanes<L> {
 
     /// Distances at which the boxes of a node are entered, and one bit per box that is.
     #[inline(always)]
-    pub(super) fn test<const N: usize, const W: usize>(&self, node: &Node<N, W>, t_max: f32) -> (L, u32)
+    pub(super) fn test<const N: usize, const W: usize>(
+        &self,
+        node: &Node<N, W>,
+        t_max: f32,
+    ) -> (L, u32)
     where
         L: Lanes<N>,
     {

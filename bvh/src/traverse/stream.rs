@@ -12,11 +12,7 @@ use super::{
     triangle::TriangleTest,
 };
 use crate::{
-    layout::{
-        block::Block,
-        node::{ChildRef, Node},
-        tree::Tree,
-    },
+    layout::{block::Block, node::ChildRef, tree::Tree},
     ray::Ray,
     simd::{Lanes, PushChildren, prefetch, stack::Stack},
 };
@@ -101,7 +97,8 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         };
         if reference.is_leaf() {
             for block in &tree.blocks[reference.blocks()] {
-                let hits = A::test(&self.ray, &self.prepared, block, &tree.points, self.best.t);
+                let hits =
+                    A::test::<T>(&self.ray, &self.prepared, block, &tree.points, self.best.t);
                 if hits.mask != 0 {
                     self.best.keep_first(&hits, block.ids());
                     if ANY {
