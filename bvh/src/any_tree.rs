@@ -20,7 +20,7 @@ use crate::{
         fast::Fast,
         kernel::{Candidate, Count, RaySetup},
         robust::Robust,
-        stream::Waiting,
+        stream::{Together, Waiting},
     },
 };
 
@@ -108,10 +108,10 @@ impl AnyTree {
         &self,
         isa: Isa,
         batch: Waiting<'_>,
-        in_flight: usize,
+        together: Together,
         tell: impl FnMut(usize, &Candidate, &RaySetup),
     ) {
-        for_width!(self, tree => tree.stream::<ANY>(isa, batch, in_flight, tell))
+        for_width!(self, tree => tree.stream::<ANY>(isa, batch, together, tell))
     }
 }
 
@@ -192,18 +192,18 @@ where
         &self,
         isa: Isa,
         batch: Waiting<'_>,
-        in_flight: usize,
+        together: Together,
         tell: impl FnMut(usize, &Candidate, &RaySetup),
     ) {
         use dispatch::stream;
         match self {
-            Self::Fast(tree) => stream::<ANY, N, W, _, Fast>(isa, tree, batch, in_flight, tell),
-            Self::Robust(tree) => stream::<ANY, N, W, _, Robust>(isa, tree, batch, in_flight, tell),
+            Self::Fast(tree) => stream::<ANY, N, W, _, Fast>(isa, tree, batch, together, tell),
+            Self::Robust(tree) => stream::<ANY, N, W, _, Robust>(isa, tree, batch, together, tell),
             Self::CompactFast(tree) => {
-                stream::<ANY, N, W, _, Fast>(isa, tree, batch, in_flight, tell);
+                stream::<ANY, N, W, _, Fast>(isa, tree, batch, together, tell);
             }
             Self::CompactRobust(tree) => {
-                stream::<ANY, N, W, _, Robust>(isa, tree, batch, in_flight, tell);
+                stream::<ANY, N, W, _, Robust>(isa, tree, batch, together, tell);
             }
         }
     }

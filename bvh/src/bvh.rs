@@ -22,7 +22,7 @@ use crate::{
     stats::TreeStats,
     traverse::{
         kernel::{Candidate, Count, RaySetup, power_of_two_below},
-        stream::{self, Waiting},
+        stream::{self, Together, Waiting},
     },
 };
 
@@ -46,7 +46,7 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
-    in_flight: usize,
+    together: Together,
     last_refit: Option<Refit>,
 }
 
@@ -145,7 +145,10 @@ impl Bvh {
             bounds,
             params: *params,
             isa: Isa::best(),
-            in_flight: 1,
+            together: Together {
+                in_flight: 1,
+                in_groups: false,
+            },
             last_refit: None,
         })
     }
@@ -244,19 +247,32 @@ impl Bvh {
     /// The same tree, traced with so many rays of a batch in flight on a core, 1 to
     /// [`Bvh::MAX_IN_FLIGHT`]; others are taken for the nearest of these. It changes no hit. What is
     /// fastest depends on scene and rays: several often serve rays that go in all directions and
-    /// wait for memory, 1 those that go side by side.
+    /// wait for memory, 1 those that are short or find the same nodes.
     #[must_use]
-    pub fn with_in_flight(self, in_flight: usize) -> Self {
-        Self {
-            in_flight: in_flight.clamp(1, Self::MAX_IN_FLIGHT),
-            ..self
-        }
+    pub fn with_in_flight(mut self, in_flight: usize) -> Self {
+        self.together.in_flight = in_flight.clamp(1, Self::MAX_IN_FLIGHT);
+        self
     }
 
     /// How many rays of a batch are in flight on a core: 1 unless it was told otherwise.
     #[must_use]
     pub fn in_flight(&self) -> usize {
-        self.in_flight
+        self.together.in_flight
+    }
+
+    /// The same tree, which traces or does not trace neighbours in a batch as groups of sixteen where their directions
+    /// have the same signs, for as long as they find the same nodes. It changes no hit. It serves rays from one point or
+    /// to one point, in an order in which neighbours are near each other.
+    #[must_use]
+    pub fn with_groups(mut self, in_groups: bool) -> Self {
+        self.together.in_groups = in_groups;
+        self
+    }
+
+    /// Whether neighbours in a batch are traced as groups: not unless it was told to.
+    #[must_use]
+    pub fn in_groups(&self) -> bool {
+        self.together.in_groups
     }
 
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine
@@ -318,7 +334,7 @@ impl Bvh {
     ) {
         let batch = Waiting::new(rays, self.scale);
         self.tree
-            .stream::<ANY>(self.isa, batch, self.in_flight, tell);
+            .stream::<ANY>(self.isa, batch, self.together, tell);
     }
 
     /// The smallest box around all triangles; empty if there are none.

@@ -96,19 +96,36 @@ fn check(
     Ok(hits)
 }
 
-/// Compares rays in flight together with one at a time.
+/// Compares rays that are traced together with one at a time: rays of all directions, and the same sorted so that groups
+/// go side by side.
 fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
     let (mut hits, mut are_hit) = (vec![], vec![]);
-    for in_flight in [1, 3, Bvh::MAX_IN_FLIGHT] {
-        let context = format!("{} {:?} {in_flight} in flight", tree.isa(), tree.params());
-        let tree = tree.clone().with_in_flight(in_flight);
-        tree.closest_hits(rays, &mut hits);
-        let hits: Vec<_> = hits.iter().map(|&hit| bits(hit)).collect();
+    let mut sorted = rays.to_vec();
+    sorted.sort_by_key(|ray| ray.direction.to_array().map(f32::is_sign_negative));
+    for rays in [rays, &sorted] {
         let alone: Vec<_> = rays.iter().map(|ray| bits(tree.closest_hit(ray))).collect();
-        prop_assert_eq!(hits, alone, "{}", context);
-        tree.any_hits(rays, &mut are_hit);
-        let alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
-        prop_assert_eq!(&are_hit, &alone, "{}", context);
+        let any_alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
+        for (in_flight, in_groups) in [
+            (1, false),
+            (3, false),
+            (1, true),
+            (Bvh::MAX_IN_FLIGHT, true),
+        ] {
+            let tree = tree
+                .clone()
+                .with_in_flight(in_flight)
+                .with_groups(in_groups);
+            let context = format!(
+                "{} {:?} {in_flight} in flight, groups {in_groups}",
+                tree.isa(),
+                tree.params()
+            );
+            tree.closest_hits(rays, &mut hits);
+            let hits: Vec<_> = hits.iter().map(|&hit| bits(hit)).collect();
+            prop_assert_eq!(&hits, &alone, "{}", context);
+            tree.any_hits(rays, &mut are_hit);
+            prop_assert_eq!(&are_hit, &any_alone, "{}", context);
+        }
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
         kernel::{self, Candidate, Count, RaySetup},
-        stream::{self, Waiting},
+        stream::{self, Together, Waiting},
         triangle::TriangleTest,
     },
 };
@@ -146,7 +146,7 @@ pub(crate) fn stream<
     isa: Isa,
     tree: &Tree<N, W, B>,
     batch: Waiting<'_>,
-    in_flight: usize,
+    together: Together,
     tell: impl FnMut(usize, &Candidate, &RaySetup),
 ) where
     Widths: Width<N>,
@@ -154,13 +154,20 @@ pub(crate) fn stream<
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx2 => unsafe { stream_avx2::<ANY, N, W, B, A, _>(tree, batch, in_flight, tell) },
+        Isa::Avx2 => unsafe { stream_avx2::<ANY, N, W, B, A, _>(tree, batch, together, tell) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx512 => unsafe { stream_avx512::<ANY, N, W, B, A, _>(tree, batch, in_flight, tell) },
-        _ => stream::trace::<ANY, N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(
-            tree, batch, in_flight, tell,
-        ),
+        Isa::Avx512 => unsafe { stream_avx512::<ANY, N, W, B, A, _>(tree, batch, together, tell) },
+        _ => stream::trace::<
+            ANY,
+            N,
+            W,
+            B,
+            A,
+            <Widths as Width<N>>::Portable,
+            f32x4,
+            <Widths as Width<16>>::Portable,
+        >(tree, batch, together, tell),
     }
 }
 
@@ -179,14 +186,21 @@ macro_rules! entries {
         >(
             tree: &Tree<N, W, B>,
             batch: Waiting<'_>,
-            in_flight: usize,
+            together: Together,
             tell: F,
         ) where
             Widths: Width<N>,
         {
-            stream::trace::<ANY, N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(
-                tree, batch, in_flight, tell,
-            );
+            stream::trace::<
+                ANY,
+                N,
+                W,
+                B,
+                A,
+                <Widths as Width<N>>::$lanes,
+                avx2::F32x4,
+                <Widths as Width<16>>::$lanes,
+            >(tree, batch, together, tell);
         }
 
         #[target_feature(enable = $features)]

@@ -108,6 +108,14 @@ impl RaySetup {
         self.octant
     }
 
+    /// What the box test adds to the product of a near plane and a far plane of an axis with the reciprocal.
+    #[inline(always)]
+    pub(super) fn addends(&self, margin: [f32; 3], axis: usize) -> [f32; 2] {
+        let offset = -self.origin[axis] * self.reciprocal[axis];
+        let pad = margin[axis] * NODE_PAD;
+        [offset - pad, offset + pad]
+    }
+
     /// A distance along the scaled ray in the caller's unit.
     #[inline]
     pub(crate) fn unscaled(&self, t: f32) -> f32 {
@@ -188,10 +196,7 @@ impl<L> BoxLanes<L> {
     {
         let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
         for axis in 0..3 {
-            let offset = -ray.origin[axis] * ray.reciprocal[axis];
-            let pad = margin[axis] * NODE_PAD;
-            near_addend[axis] = offset - pad;
-            far_addend[axis] = offset + pad;
+            [near_addend[axis], far_addend[axis]] = ray.addends(margin, axis);
             near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
         }
         Self {
@@ -294,6 +299,32 @@ pub(crate) fn closest<
         ChildRef::inner(0).0,
         ray.t_min,
     );
+    follow::<false, N, W, B, A, L, T, C>(
+        tree, ray, &boxes, &prepared, &mut stack, &mut best, count,
+    );
+    best.candidate()
+}
+
+/// Visits what waits on the stack and keeps the closest hit; with `ANY` no more after the first.
+#[inline(always)]
+pub(super) fn follow<
+    const ANY: bool,
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: PushChildren<N>,
+    T: Lanes<4>,
+    C: Count,
+>(
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    boxes: &BoxLanes<L>,
+    prepared: &A::Ray<T>,
+    stack: &mut Stack<N>,
+    best: &mut Best,
+    count: &mut C,
+) {
     while let Some((reference, distance)) = stack.pop() {
         if distance > best.t {
             continue;
@@ -301,24 +332,26 @@ pub(crate) fn closest<
         let order = |node: &Node<N, W>| node.order(ray.octant);
         let Some(leaf) = descend(
             tree,
-            &boxes,
+            boxes,
             ChildRef(reference),
             best.t,
             order,
-            &mut stack,
+            stack,
             count,
         ) else {
             continue;
         };
         for block in &tree.blocks[leaf.blocks()] {
             count.block();
-            let hits = A::test(ray, &prepared, block, &tree.points, best.t);
+            let hits = A::test(ray, prepared, block, &tree.points, best.t);
             if hits.mask != 0 {
                 best.keep_first(&hits, block.ids());
+                if ANY {
+                    return;
+                }
             }
         }
     }
-    best.candidate()
 }
 
 /// The first hit so far; its weights are still to be divided by `den`.
@@ -344,8 +377,21 @@ impl Best {
     }
 
     #[inline(always)]
+    pub(super) fn is_hit(&self) -> bool {
+        self.id != u32::MAX
+    }
+
+    /// The hit, which is none afterwards.
+    #[inline(always)]
+    pub(super) fn take(&mut self) -> Option<Candidate> {
+        let hit = self.candidate();
+        self.id = u32::MAX;
+        hit
+    }
+
+    #[inline(always)]
     pub(super) fn candidate(&self) -> Option<Candidate> {
-        (self.id != u32::MAX).then(|| Candidate {
+        self.is_hit().then(|| Candidate {
             u: self.u / self.den,
             v: self.v / self.den,
             t: self.t,

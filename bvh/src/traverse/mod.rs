@@ -2,6 +2,7 @@
 
 pub(crate) mod box_test;
 pub(crate) mod fast;
+pub(crate) mod group;
 pub(crate) mod kernel;
 pub mod reference;
 pub(crate) mod robust;

@@ -1,6 +1,6 @@
-//! Traversal by several rays in turns: while one waits for a node or a block that it asked for, the
-//! others work. After the streams of Embree and of Barringer, Akenine-Möller, *Dynamic Ray Stream
-//! Traversal*, 2014, but without any sorting: the rays share nothing.
+//! Traversal by a batch of rays: those that go side by side in groups (`group`), the others by several in turns: while
+//! one waits for a node or a block that it asked for, the others work. After the streams of Embree and of Barringer,
+//! Akenine-Möller, *Dynamic Ray Stream Traversal*, 2014, but without any sorting: the rays share nothing.
 //!
 //! Invariants: each ray visits what it would visit alone, but for the child that a single ray goes
 //! down to at once and that lies on the stack here; whether and where it hits is a function of ray
@@ -8,6 +8,7 @@
 //! bit, however many are in flight and in whatever order they come.
 
 use super::{
+    group::{GROUP_SIZE, Groups, go_side_by_side},
     kernel::{Best, BoxLanes, Candidate, RaySetup},
     triangle::TriangleTest,
 };
@@ -20,11 +21,27 @@ use crate::{
 /// Most rays in flight: more than a core can have in its queues of misses.
 pub(crate) const MAX_IN_FLIGHT: usize = 32;
 
+/// How the rays of a batch are traced.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Together {
+    /// How many are in flight, 1 to [`MAX_IN_FLIGHT`].
+    pub(crate) in_flight: usize,
+    /// Whether those that go side by side are traced as groups.
+    pub(crate) in_groups: bool,
+}
+
 /// The rays of a batch that have not begun.
 pub(crate) struct Waiting<'a> {
     rays: &'a [Ray],
     scale: f32,
     next: usize,
+}
+
+/// What begins next.
+enum Next<'a> {
+    /// Rays that go side by side, the first of which has this place in the batch.
+    Group(usize, &'a [Ray]),
+    Alone(usize, RaySetup),
 }
 
 impl<'a> Waiting<'a> {
@@ -37,14 +54,22 @@ impl<'a> Waiting<'a> {
         }
     }
 
-    /// The next ray that can hit anything, with its place in the batch.
+    /// The next ray that can hit anything, or the next rays if they go side by side.
     #[inline(always)]
-    fn next(&mut self) -> Option<(usize, RaySetup)> {
+    fn next(&mut self, in_groups: bool) -> Option<Next<'a>> {
         while let Some(ray) = self.rays.get(self.next) {
             let place = self.next;
+            if in_groups
+                && place.is_multiple_of(GROUP_SIZE)
+                && let Some(rays) = self.rays.get(place..place + GROUP_SIZE)
+                && go_side_by_side(rays)
+            {
+                self.next += GROUP_SIZE;
+                return Some(Next::Group(place, rays));
+            }
             self.next += 1;
             if let Some(setup) = RaySetup::new(ray, self.scale) {
-                return Some((place, setup));
+                return Some(Next::Alone(place, setup));
             }
         }
         None
@@ -63,9 +88,27 @@ struct Traveller<const N: usize, L, P> {
 }
 
 impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
+    #[inline(always)]
+    fn new<B, A, T>(place: usize, ray: RaySetup) -> Self
+    where
+        A: TriangleTest<B, Ray<T> = P>,
+        T: Lanes<4>,
+    {
+        let mut stack = Stack::new();
+        stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        Self {
+            place,
+            boxes: BoxLanes::new(&ray, A::margin(&ray)),
+            prepared: A::prepare::<T>(&ray),
+            best: Best::none(ray.t_max),
+            stack,
+            ray,
+        }
+    }
+
     /// Begins with another ray.
     #[inline(always)]
-    fn restart<B, A, T>(&mut self, place: usize, ray: RaySetup)
+    fn begin<B, A, T>(&mut self, place: usize, ray: RaySetup)
     where
         A: TriangleTest<B, Ray<T> = P>,
         T: Lanes<4>,
@@ -137,8 +180,8 @@ fn ask_for<const N: usize, const W: usize, B>(tree: &Tree<N, W, B>, reference: C
     }
 }
 
-/// Traces all rays of a batch, at most `in_flight` at once, and tells of each that hits something,
-/// with its place in the batch, in no certain order. With `ANY` the hit is any.
+/// Traces all rays of a batch and tells of each that hits something, with its place in the batch, in no certain order.
+/// With `ANY` the hit is any.
 #[inline(always)]
 pub(crate) fn trace<
     const ANY: bool,
@@ -148,47 +191,63 @@ pub(crate) fn trace<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
+    R: Lanes<GROUP_SIZE>,
 >(
     tree: &Tree<N, W, B>,
     mut waiting: Waiting<'_>,
-    in_flight: usize,
+    Together {
+        in_flight,
+        in_groups,
+    }: Together,
     mut tell: impl FnMut(usize, &Candidate, &RaySetup),
 ) {
     if tree.nodes.is_empty() {
         return;
     }
-    let mut travellers: Vec<Traveller<N, L, A::Ray<T>>> = Vec::with_capacity(in_flight);
-    while travellers.len() < in_flight {
-        let Some((place, ray)) = waiting.next() else {
-            break;
-        };
-        travellers.push(Traveller {
-            place,
-            boxes: BoxLanes::new(&ray, A::margin(&ray)),
-            prepared: A::prepare::<T>(&ray),
-            best: Best::none(ray.t_max),
-            stack: Stack::new(),
-            ray,
-        });
-        if let Some(traveller) = travellers.last_mut() {
-            traveller.stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+    let scale = waiting.scale;
+    let mut groups = Groups::<N, A::Ray<T>>::new();
+    let mut travellers: Vec<Traveller<N, L, A::Ray<T>>> = Vec::new();
+    let (mut places, mut turn) = (in_flight, 0);
+    loop {
+        if turn == places {
+            turn = 0;
         }
-    }
-    while !travellers.is_empty() {
-        let mut turn = 0;
-        while let Some(traveller) = travellers.get_mut(turn) {
+        if let Some(traveller) = travellers.get_mut(turn) {
             if traveller.step::<ANY, W, B, A, T>(tree) {
                 turn += 1;
                 continue;
             }
-            if let Some(hit) = traveller.best.candidate() {
+            if let Some(hit) = traveller.best.take() {
                 tell(traveller.place, &hit, &traveller.ray);
             }
-            if let Some((place, ray)) = waiting.next() {
-                traveller.restart::<B, A, T>(place, ray);
+        }
+        // The place in turn is free.
+        match waiting.next(in_groups) {
+            Some(Next::Group(first, rays)) => {
+                groups.trace::<ANY, W, B, A, L, T, R>(tree, rays, scale, first, &mut tell)
+            }
+            Some(Next::Alone(place, ray)) if in_flight == 1 => {
+                if let Some(hit) = groups.trace_one::<ANY, W, B, A, L, T>(tree, &ray) {
+                    tell(place, &hit, &ray);
+                }
+            }
+            Some(Next::Alone(place, ray)) => {
+                match travellers.get_mut(turn) {
+                    Some(traveller) => traveller.begin::<B, A, T>(place, ray),
+                    None => travellers.push(Traveller::new::<B, A, T>(place, ray)),
+                }
                 turn += 1;
-            } else {
+            }
+            None if turn < travellers.len() => {
                 travellers.swap_remove(turn);
+                places = travellers.len();
+            }
+            None => {
+                places = travellers.len();
+                turn = 0;
+                if places == 0 {
+                    return;
+                }
             }
         }
     }
