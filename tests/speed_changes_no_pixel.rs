@@ -6,7 +6,7 @@
 use std::num::NonZeroU32;
 
 use raywright::{
-    bvh::{BuildError, BuildParams, Bvh, Dynamics, Isa},
+    bvh::{BuildError, BuildParams, Bvh, Isa, PARAMETERS, ParameterRange},
     imaging::{Camera, Film, TileLoop},
     tracer::{Integrator, Shot, View, World, generate},
 };
@@ -37,16 +37,38 @@ impl Numbers {
     }
 }
 
+/// A random value of every parameter that changes no hit.
 fn random_params(numbers: &mut Numbers) -> BuildParams {
     let mut params = BuildParams::default();
-    params.branching_factor = [2, 4, 8][numbers.below(3) as usize];
-    params.max_depth = 10 + numbers.below(55);
-    params.sah_block_size = 1 + numbers.below(32);
-    params.max_leaf_size = 1 + numbers.below(32);
-    params.min_leaf_size = 1 + numbers.below(32);
-    params.traversal_cost = numbers.cost();
-    params.intersection_cost = numbers.cost();
-    params.dynamics = [Dynamics::Dynamic, Dynamics::Static][numbers.below(2) as usize];
+    for parameter in PARAMETERS
+        .iter()
+        .filter(|parameter| !parameter.changes_hits)
+    {
+        let value = match (parameter.name, parameter.range) {
+            // Widths between are stored as the next of these.
+            ("branching_factor", _) => [2, 4, 8, 16][numbers.below(4) as usize].to_string(),
+            // A scene has a depth below which no tree is.
+            ("max_depth", _) => (10 + numbers.below(55)).to_string(),
+            ("traversal_cost" | "intersection_cost", _) => numbers.cost().to_string(),
+            // More cuts than anybody wants take long.
+            ("split_budget", _) => (1.0 + numbers.below(1000) as f32 / 999.0).to_string(),
+            (_, ParameterRange::Integers(min, max)) => {
+                (min + numbers.below(max - min + 1)).to_string()
+            }
+            (_, ParameterRange::OneOf(values)) => {
+                values[numbers.below(values.len() as u32) as usize].to_string()
+            }
+            (_, ParameterRange::Reals(min, max)) => {
+                (min + (max - min) * numbers.below(1000) as f32 / 999.0).to_string()
+            }
+            (_, ParameterRange::Words(words)) => {
+                words[numbers.below(words.len() as u32) as usize].to_owned()
+            }
+        };
+        params
+            .set(parameter.name, &value)
+            .expect("a value of its range");
+    }
     params
 }
 

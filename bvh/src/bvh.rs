@@ -16,7 +16,7 @@ use crate::{
         triangles::{Triangles, locate},
     },
     mesh::{MeshError, TriangleMesh},
-    params::BuildParams,
+    params::{BuildParams, RayPackets},
     ray::{Hit, Ray, Work},
     simd::Isa,
     stats::TreeStats,
@@ -46,7 +46,6 @@ pub struct Bvh {
     bounds: Aabb,
     params: BuildParams,
     isa: Isa,
-    together: Together,
     last_refit: Option<Refit>,
 }
 
@@ -145,10 +144,6 @@ impl Bvh {
             bounds,
             params: *params,
             isa: Isa::best(),
-            together: Together {
-                in_flight: 1,
-                in_groups: false,
-            },
             last_refit: None,
         })
     }
@@ -241,38 +236,27 @@ impl Bvh {
         Ok(())
     }
 
-    /// The most rays that a core has in flight.
-    pub const MAX_IN_FLIGHT: usize = stream::MAX_IN_FLIGHT;
-
-    /// The same tree, traced with so many rays of a batch in flight on a core, 1 to
-    /// [`Bvh::MAX_IN_FLIGHT`]; others are taken for the nearest of these. It changes no hit. What is
-    /// fastest depends on scene and rays: several often serve rays that go in all directions and
-    /// wait for memory, 1 those that are short or find the same nodes.
+    /// The same tree, which traces the rays of a batch with so many in flight on a core
+    /// ([`BuildParams::rays_in_flight`]), from 1 to the largest number that is valid there; others are taken for the
+    /// nearest of these. It changes no hit.
     #[must_use]
-    pub fn with_in_flight(mut self, in_flight: usize) -> Self {
-        self.together.in_flight = in_flight.clamp(1, Self::MAX_IN_FLIGHT);
+    pub fn with_rays_in_flight(mut self, rays_in_flight: u32) -> Self {
+        self.params.rays_in_flight = rays_in_flight.clamp(1, stream::MAX_IN_FLIGHT as u32);
         self
     }
 
-    /// How many rays of a batch are in flight on a core: 1 unless it was told otherwise.
+    /// The same tree, which traces or does not trace neighbours in a batch together
+    /// ([`BuildParams::ray_packets`]). It changes no hit.
     #[must_use]
-    pub fn in_flight(&self) -> usize {
-        self.together.in_flight
-    }
-
-    /// The same tree, which traces or does not trace neighbours in a batch as groups of sixteen where their directions
-    /// have the same signs, for as long as they find the same nodes. It changes no hit. It serves rays from one point or
-    /// to one point, in an order in which neighbours are near each other.
-    #[must_use]
-    pub fn with_groups(mut self, in_groups: bool) -> Self {
-        self.together.in_groups = in_groups;
+    pub fn with_ray_packets(mut self, ray_packets: RayPackets) -> Self {
+        self.params.ray_packets = ray_packets;
         self
     }
 
-    /// Whether neighbours in a batch are traced as groups: not unless it was told to.
+    /// Whether rays are to be traced in batches: they are traced in turns or as packets there.
     #[must_use]
-    pub fn in_groups(&self) -> bool {
-        self.together.in_groups
+    pub fn prefers_batches(&self) -> bool {
+        self.params.rays_in_flight > 1 || self.params.ray_packets == RayPackets::On
     }
 
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine
@@ -310,8 +294,8 @@ impl Bvh {
     }
 
     /// The closest hits of many rays, `hits[i]` becoming that of `rays[i]`: those of
-    /// [`Bvh::closest_hit`] to the last bit, found with several rays in flight on this core, which
-    /// take their turns while memory is waited for ([`Bvh::with_in_flight`]).
+    /// [`Bvh::closest_hit`] to the last bit, found as [`BuildParams::rays_in_flight`]
+    /// and [`BuildParams::ray_packets`] say.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(rays.len(), None);
@@ -333,8 +317,11 @@ impl Bvh {
         tell: impl FnMut(usize, &Candidate, &RaySetup),
     ) {
         let batch = Waiting::new(rays, self.scale);
-        self.tree
-            .stream::<ANY>(self.isa, batch, self.together, tell);
+        let together = Together {
+            in_flight: self.params.rays_in_flight as usize,
+            in_packets: self.params.ray_packets == RayPackets::On,
+        };
+        self.tree.stream::<ANY>(self.isa, batch, together, tell);
     }
 
     /// The smallest box around all triangles; empty if there are none.

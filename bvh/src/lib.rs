@@ -45,7 +45,7 @@ pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
 pub use mesh::{MeshError, TriangleMesh};
 pub use params::{
     Accuracy, BuildParams, Dynamics, LeafFormat, PARAMETERS, Parameter, ParameterRange,
-    ParameterValue, Quality, Rounding,
+    ParameterValue, Quality, RayPackets, Rounding,
 };
 pub use ray::{Hit, Ray, Work};
 pub use simd::Isa;

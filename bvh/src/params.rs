@@ -6,7 +6,7 @@
 //! [`PARAMETERS`] is the one table of names, ranges and meanings: validation, command line and
 //! tuner read it. Invariant: a value that has no meaning here is an error; no value is ever ignored.
 
-use crate::error::ParameterFault;
+use crate::{error::ParameterFault, traverse::stream::MAX_IN_FLIGHT};
 
 /// How primitives are divided into subtrees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,6 +66,16 @@ pub enum Accuracy {
     Fast,
     /// Watertight (the paper's flag `robust`).
     Robust,
+}
+
+/// How rays of a batch that are neighbours and go side by side are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RayPackets {
+    /// As all others.
+    Off,
+    /// Sixteen at a time where their directions have the same signs, for as long as they find the same nodes. It serves
+    /// rays from one point or to one point, in an order in which neighbours are near each other.
+    On,
 }
 
 /// The value of one parameter, whatever its kind.
@@ -129,7 +139,7 @@ const QUALITIES: [&str; 5] = [
 const COST_LIMIT: f32 = 1000.0;
 
 /// The eleven parameters of the paper's Table 1 in its order, then those of this crate alone.
-pub const PARAMETERS: [Parameter; 14] = [
+pub const PARAMETERS: [Parameter; 16] = [
     Parameter {
         name: "quality",
         range: ParameterRange::Words(&QUALITIES),
@@ -228,9 +238,23 @@ pub const PARAMETERS: [Parameter; 14] = [
         changes_hits: false,
         meaning: "most exchanges of subtrees below each node of a Morton tree; no effect on others",
     },
+    Parameter {
+        name: "rays_in_flight",
+        range: ParameterRange::Integers(1, MAX_IN_FLIGHT as u32),
+        tuned: ParameterRange::OneOf(&[1, 4, 8, 16]),
+        changes_hits: false,
+        meaning: "rays of a batch that a core traces in turns",
+    },
+    Parameter {
+        name: "ray_packets",
+        range: ParameterRange::Words(&["off", "on"]),
+        tuned: ParameterRange::Words(&["off", "on"]),
+        changes_hits: false,
+        meaning: "on traces neighbours in a batch together for as long as they find the same nodes",
+    },
 ];
 
-/// What a tree is built with. Every combination of values either has a documented meaning or is an
+/// What a tree is built and traced with. Every combination of values either has a documented meaning or is an
 /// error of [`BuildParams::validate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -268,6 +292,12 @@ pub struct BuildParams {
     /// time to build, a tree that is faster to trace; 0..=16. Acts on Morton order alone. 1 is what
     /// Embree does in its own scenes with nodes of four.
     pub rotations: u32,
+    /// How many rays of a batch (`Bvh::closest_hits`) a core traces in turns, 1..=32, so that one works while another
+    /// waits for memory. What is fastest depends on scene and rays: several often serve rays that go in all directions,
+    /// 1 those that are short or find the same nodes.
+    pub rays_in_flight: u32,
+    /// How neighbours in a batch that go side by side are traced.
+    pub ray_packets: RayPackets,
 }
 
 impl Default for BuildParams {
@@ -297,6 +327,8 @@ impl BuildParams {
             split_budget: 1.2,
             rounding: Rounding::Exact,
             rotations: 0,
+            rays_in_flight: 1,
+            ray_packets: RayPackets::Off,
         }
     }
 
@@ -427,6 +459,11 @@ impl BuildParams {
                 Rounding::Embree => "embree",
             }),
             "rotations" => Integer(self.rotations),
+            "rays_in_flight" => Integer(self.rays_in_flight),
+            "ray_packets" => Choice(match self.ray_packets {
+                RayPackets::Off => "off",
+                RayPackets::On => "on",
+            }),
             _ => return None,
         })
     }
@@ -497,12 +534,20 @@ impl BuildParams {
                 }
             }
             "rotations" => self.rotations = integer()?,
+            "rays_in_flight" => self.rays_in_flight = integer()?,
+            "ray_packets" => {
+                self.ray_packets = match text {
+                    "off" => RayPackets::Off,
+                    "on" => RayPackets::On,
+                    _ => return Err(not_understood()),
+                }
+            }
             _ => unreachable!("every name of the table has an arm"),
         }
         Ok(())
     }
 
-    /// The representative of all values that build the same tree: the smaller leaf limit capped by
+    /// The representative of all values that build the same tree and trace it alike: the smaller leaf limit capped by
     /// the larger, the block size rounded down to a power of two, both costs divided by the power
     /// of two that brings the intersection cost into 1..2 (exact in binary arithmetic; an
     /// intersection cost of 0 leaves the traversal cost alone), and what the quality does not look
@@ -614,6 +659,8 @@ mod tests {
             accuracy: Accuracy::Robust,
             dynamics: Dynamics::Static,
             rotations: 3,
+            rays_in_flight: 5,
+            ray_packets: RayPackets::On,
             ..BuildParams::embree_api_default()
         };
         for parameter in &PARAMETERS {
@@ -634,11 +681,12 @@ mod tests {
             traversal_cost: f32::NAN,
             intersection_cost: -1.0,
             rotations: 17,
+            rays_in_flight: 0,
             leaf_format: LeafFormat::Compact,
             accuracy: Accuracy::Robust,
             ..BuildParams::default()
         };
-        assert_eq!(params.faults().len(), 8);
+        assert_eq!(params.faults().len(), 9);
     }
 
     #[test]

@@ -7,8 +7,8 @@
 
 use proptest::prelude::*;
 use raywright_bvh::{
-    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Quality, Ray, TriangleMesh, Vec3,
-    reference,
+    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Quality, Ray, RayPackets,
+    TriangleMesh, Vec3, reference,
 };
 
 /// Distance, weights, geometry, primitive.
@@ -96,7 +96,7 @@ fn check(
     Ok(hits)
 }
 
-/// Compares rays that are traced together with one at a time: rays of all directions, and the same sorted so that groups
+/// Compares rays that are traced together with one at a time: rays of all directions, and the same sorted so that packets
 /// go side by side.
 fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
     let (mut hits, mut are_hit) = (vec![], vec![]);
@@ -105,21 +105,17 @@ fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
     for rays in [rays, &sorted] {
         let alone: Vec<_> = rays.iter().map(|ray| bits(tree.closest_hit(ray))).collect();
         let any_alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
-        for (in_flight, in_groups) in [
-            (1, false),
-            (3, false),
-            (1, true),
-            (Bvh::MAX_IN_FLIGHT, true),
+        for (in_flight, packets) in [
+            (1, RayPackets::Off),
+            (3, RayPackets::Off),
+            (1, RayPackets::On),
+            (32, RayPackets::On),
         ] {
             let tree = tree
                 .clone()
-                .with_in_flight(in_flight)
-                .with_groups(in_groups);
-            let context = format!(
-                "{} {:?} {in_flight} in flight, groups {in_groups}",
-                tree.isa(),
-                tree.params()
-            );
+                .with_rays_in_flight(in_flight)
+                .with_ray_packets(packets);
+            let context = format!("{} {:?}", tree.isa(), tree.params());
             tree.closest_hits(rays, &mut hits);
             let hits: Vec<_> = hits.iter().map(|&hit| bits(hit)).collect();
             prop_assert_eq!(&hits, &alone, "{}", context);

@@ -25,7 +25,13 @@ const MOST_COST_RATIO: f64 = 64.0;
 const MOST_LEAF: u32 = 32;
 
 /// What the paper has not: parameters, and among qualities all but these.
-pub(super) const OURS: &[&str] = &["split_budget", "rounding", "rotations"];
+pub(super) const OURS: &[&str] = &[
+    "split_budget",
+    "rounding",
+    "rotations",
+    "rays_in_flight",
+    "ray_packets",
+];
 pub(super) const PAPER_QUALITIES: &[&str] = &["morton", "binned-sah", "spatial-splits"];
 
 /// The axis that stands for a parameter of the table; `None`: the usual one.

@@ -32,8 +32,8 @@ pub fn portfolio(base: &BuildParams, metric: Metric) -> Vec<BuildParams> {
     };
     let wide = with_costs(with(Quality::Agglomerative, 16, [2, 14], 4), 1, 0.05);
     // The best of the recordings among those that take no longer to build than the default, with 16 children and with 8.
-    let sixteen = with_costs(with(Quality::BinnedSah, 16, [6, 32], 2), 16, 0.05);
-    let eight = with_costs(with(Quality::BinnedSah, 8, [6, 32], 4), 4, 0.03);
+    let sixteen = with_costs(with(Quality::BinnedSah, 16, [6, 32], 0), 16, 0.05);
+    let eight = with_costs(with(Quality::BinnedSah, 8, [6, 32], 0), 4, 0.03);
     let few_frames = metric
         .frames_per_tree()
         .is_some_and(|n| n.get() < FEW_FRAMES);

@@ -68,16 +68,17 @@ impl Shot<'_> {
             (Ray::new(projection.origin(), direction), sampler)
         };
         if let Integrator::Path { path_length } = self.integrator
-            && tree.in_flight() > 1
+            && tree.prefers_batches()
         {
+            let mut paths = Vec::new();
             for sample in samples {
-                let begin = |pixel| {
+                paths.clear();
+                paths.extend(tile.pixels_by_squares(wave::SQUARE).map(|pixel| {
                     let (ray, sampler) = ray_of(pixel, sample);
                     (Path::new(ray), sampler)
-                };
-                let mut paths: Vec<_> = tile.pixels().map(begin).collect();
+                }));
                 wave::follow(self.world, tree, &mut paths, path_length);
-                for ((x, y), (path, _)) in tile.pixels().zip(paths) {
+                for ((x, y), (path, _)) in tile.pixels_by_squares(wave::SQUARE).zip(&paths) {
                     view.pixel_mut(x, y).add(path.radiance);
                 }
             }

@@ -16,7 +16,7 @@ use std::{
 
 use flate2::read::MultiGzDecoder;
 use raywright::tune::{ParameterSpace, SLOWEST_TRIAL, SpaceAxes};
-use raywright_bvh::{BuildParams, PARAMETERS, Quality};
+use raywright_bvh::{BuildParams, PARAMETERS, Parameter, Quality};
 
 use super::{DataSet, FRAME_PIXELS, PORTFOLIO, Problem, Row, State, WEAK};
 use crate::scenes::{SceneCameras, cameras_file, scenes_folder};
@@ -24,6 +24,9 @@ use crate::scenes::{SceneCameras, cameras_file, scenes_folder};
 /// What the recorder calls the weak default, and known-good configurations.
 const WEAK_SOURCE: &str = "table-1-default";
 const PORTFOLIO_SOURCE: &str = "portfolio";
+
+/// Parameters that are younger than the recordings: all were made with their defaults.
+const YOUNGER: [&str; 2] = ["rays_in_flight", "ray_packets"];
 
 /// A line of a recording.
 #[derive(Clone, Debug)]
@@ -114,7 +117,8 @@ fn line(cells: &HashMap<String, String>) -> Result<Line, Box<dyn Error>> {
         }
     };
     let mut params = BuildParams::default();
-    for parameter in PARAMETERS {
+    let recorded = |parameter: &&Parameter| !YOUNGER.contains(&parameter.name);
+    for parameter in PARAMETERS.iter().filter(recorded) {
         params.set(parameter.name, text(parameter.name)?)?;
     }
     let times = match text("fail")? {
@@ -144,7 +148,7 @@ fn data_set(
     lines: &[Line],
     described: &HashMap<String, SceneCameras>,
 ) -> Result<DataSet, Box<dyn Error>> {
-    let space = |axes| ParameterSpace::new(&BuildParams::default(), &[], axes);
+    let space = |axes| ParameterSpace::new(&BuildParams::default(), &YOUNGER, axes);
     let spaces = [space(SpaceAxes::Printed)?, space(SpaceAxes::Canonical)?];
     let mut scenes: BTreeMap<&str, Vec<&Line>> = BTreeMap::new();
     for line in lines {

@@ -2,8 +2,8 @@
 
 pub(crate) mod box_test;
 pub(crate) mod fast;
-pub(crate) mod group;
 pub(crate) mod kernel;
+pub(crate) mod packet;
 pub mod reference;
 pub(crate) mod robust;
 pub(crate) mod stream;

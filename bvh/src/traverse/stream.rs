@@ -1,4 +1,4 @@
-//! Traversal by a batch of rays: those that go side by side in groups (`group`), the others by several in turns: while
+//! Traversal by a batch of rays: those that go side by side in packets (`packet`), the others by several in turns: while
 //! one waits for a node or a block that it asked for, the others work. After the streams of Embree and of Barringer,
 //! Akenine-Möller, *Dynamic Ray Stream Traversal*, 2014, but without any sorting: the rays share nothing.
 //!
@@ -8,8 +8,8 @@
 //! bit, however many are in flight and in whatever order they come.
 
 use super::{
-    group::{GROUP_SIZE, Groups, go_side_by_side},
     kernel::{Best, BoxLanes, Candidate, RaySetup},
+    packet::{PACKET_SIZE, Packets, go_side_by_side},
     triangle::TriangleTest,
 };
 use crate::{
@@ -26,8 +26,8 @@ pub(crate) const MAX_IN_FLIGHT: usize = 32;
 pub(crate) struct Together {
     /// How many are in flight, 1 to [`MAX_IN_FLIGHT`].
     pub(crate) in_flight: usize,
-    /// Whether those that go side by side are traced as groups.
-    pub(crate) in_groups: bool,
+    /// Whether those that go side by side are traced as packets.
+    pub(crate) in_packets: bool,
 }
 
 /// The rays of a batch that have not begun.
@@ -40,7 +40,7 @@ pub(crate) struct Waiting<'a> {
 /// What begins next.
 enum Next<'a> {
     /// Rays that go side by side, the first of which has this place in the batch.
-    Group(usize, &'a [Ray]),
+    Packet(usize, &'a [Ray]),
     Alone(usize, RaySetup),
 }
 
@@ -56,16 +56,16 @@ impl<'a> Waiting<'a> {
 
     /// The next ray that can hit anything, or the next rays if they go side by side.
     #[inline(always)]
-    fn next(&mut self, in_groups: bool) -> Option<Next<'a>> {
+    fn next(&mut self, in_packets: bool) -> Option<Next<'a>> {
         while let Some(ray) = self.rays.get(self.next) {
             let place = self.next;
-            if in_groups
-                && place.is_multiple_of(GROUP_SIZE)
-                && let Some(rays) = self.rays.get(place..place + GROUP_SIZE)
+            if in_packets
+                && place.is_multiple_of(PACKET_SIZE)
+                && let Some(rays) = self.rays.get(place..place + PACKET_SIZE)
                 && go_side_by_side(rays)
             {
-                self.next += GROUP_SIZE;
-                return Some(Next::Group(place, rays));
+                self.next += PACKET_SIZE;
+                return Some(Next::Packet(place, rays));
             }
             self.next += 1;
             if let Some(setup) = RaySetup::new(ray, self.scale) {
@@ -191,13 +191,13 @@ pub(crate) fn trace<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    R: Lanes<GROUP_SIZE>,
+    R: Lanes<PACKET_SIZE>,
 >(
     tree: &Tree<N, W, B>,
     mut waiting: Waiting<'_>,
     Together {
         in_flight,
-        in_groups,
+        in_packets,
     }: Together,
     mut tell: impl FnMut(usize, &Candidate, &RaySetup),
 ) {
@@ -205,7 +205,7 @@ pub(crate) fn trace<
         return;
     }
     let scale = waiting.scale;
-    let mut groups = Groups::<N, A::Ray<T>>::new();
+    let mut packets = Packets::<N, A::Ray<T>>::new();
     let mut travellers: Vec<Traveller<N, L, A::Ray<T>>> = Vec::new();
     let (mut places, mut turn) = (in_flight, 0);
     loop {
@@ -222,12 +222,12 @@ pub(crate) fn trace<
             }
         }
         // The place in turn is free.
-        match waiting.next(in_groups) {
-            Some(Next::Group(first, rays)) => {
-                groups.trace::<ANY, W, B, A, L, T, R>(tree, rays, scale, first, &mut tell)
+        match waiting.next(in_packets) {
+            Some(Next::Packet(first, rays)) => {
+                packets.trace::<ANY, W, B, A, L, T, R>(tree, rays, scale, first, &mut tell)
             }
             Some(Next::Alone(place, ray)) if in_flight == 1 => {
-                if let Some(hit) = groups.trace_one::<ANY, W, B, A, L, T>(tree, &ray) {
+                if let Some(hit) = packets.trace_one::<ANY, W, B, A, L, T>(tree, &ray) {
                     tell(place, &hit, &ray);
                 }
             }

@@ -10,6 +10,9 @@ use raywright_imaging::sampler::PixelSampler;
 use super::path::Path;
 use crate::{scene::Rgb, world::World};
 
+/// Side of the squares of pixels in the order of which paths best come, so that sixteen neighbours are a packet.
+pub(crate) const SQUARE: u32 = 4;
+
 /// Follows all paths to their ends.
 pub(crate) fn follow(
     world: &World,

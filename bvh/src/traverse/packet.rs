@@ -5,7 +5,7 @@
 //! Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture*, 2012): rays that part cost
 //! little more than if they had never been together.
 //!
-//! Invariants: the rays of a group have one octant; boxes are tested as conservatively as for one ray (see `Bundle`), so
+//! Invariants: the rays of a packet have one octant; boxes are tested as conservatively as for one ray (see `Bundle`), so
 //! that answers are those of one ray at a time to the last bit.
 
 use super::{
@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// How many rays go together.
-pub(crate) const GROUP_SIZE: usize = 16;
+pub(crate) const PACKET_SIZE: usize = 16;
 
 /// So many rays are not worth their company.
 const TOO_FEW: u32 = 3;
@@ -40,7 +40,7 @@ pub(super) fn go_side_by_side(rays: &[Ray]) -> bool {
     (differ[0] | differ[1] | differ[2]) >> 31 == 0
 }
 
-/// What a ray of a group needs for itself.
+/// What a ray of a packet needs for itself.
 struct Member<P> {
     place: usize,
     ray: RaySetup,
@@ -49,7 +49,7 @@ struct Member<P> {
 }
 
 /// A value of each ray, 0 for lanes without.
-type OfRays = [f32; GROUP_SIZE];
+type OfRays = [f32; PACKET_SIZE];
 
 /// The rays in lanes.
 struct RayLanes {
@@ -63,16 +63,16 @@ struct RayLanes {
 
 impl RayLanes {
     const NONE: Self = Self {
-        reciprocal: [[0.0; GROUP_SIZE]; 3],
-        near_addend: [[0.0; GROUP_SIZE]; 3],
-        far_addend: [[0.0; GROUP_SIZE]; 3],
-        t_min: [0.0; GROUP_SIZE],
-        t_max: [f32::NEG_INFINITY; GROUP_SIZE],
+        reciprocal: [[0.0; PACKET_SIZE]; 3],
+        near_addend: [[0.0; PACKET_SIZE]; 3],
+        far_addend: [[0.0; PACKET_SIZE]; 3],
+        t_min: [0.0; PACKET_SIZE],
+        t_max: [f32::NEG_INFINITY; PACKET_SIZE],
     };
 
     /// The operations of `BoxLanes`, with rays in the lanes instead of boxes.
     #[inline(always)]
-    fn test<const N: usize, const W: usize, R: Lanes<GROUP_SIZE>>(
+    fn test<const N: usize, const W: usize, R: Lanes<PACKET_SIZE>>(
         &self,
         node: &Node<N, W>,
         slot: usize,
@@ -170,14 +170,14 @@ struct Entry {
     enter: OfRays,
 }
 
-/// The memory of groups, one after the other.
-pub(super) struct Groups<const N: usize, P> {
+/// The memory of packets, one after the other.
+pub(super) struct Packets<const N: usize, P> {
     members: Vec<Member<P>>,
     waiting: Vec<Entry>,
     stack: Stack<N>,
 }
 
-impl<const N: usize, P> Groups<N, P> {
+impl<const N: usize, P> Packets<N, P> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         Self {
@@ -216,7 +216,7 @@ impl<const N: usize, P> Groups<N, P> {
         best.candidate()
     }
 
-    /// Traces rays of one octant, at most [`GROUP_SIZE`], the first of which has the place `first`; tells of those that
+    /// Traces rays of one octant, at most [`PACKET_SIZE`], the first of which has the place `first`; tells of those that
     /// hit something. With `ANY` the hit is any.
     #[inline(always)]
     pub(super) fn trace<const ANY: bool, const W: usize, B, A, L, T, R>(
@@ -231,7 +231,7 @@ impl<const N: usize, P> Groups<N, P> {
         A: TriangleTest<B, Ray<T> = P>,
         L: PushChildren<N>,
         T: Lanes<4>,
-        R: Lanes<GROUP_SIZE>,
+        R: Lanes<PACKET_SIZE>,
     {
         let mut lanes = RayLanes::NONE;
         self.members.clear();
@@ -295,7 +295,7 @@ impl<const N: usize, P> Groups<N, P> {
                 continue;
             }
             while rays != 0 {
-                let lane = rays.trailing_zeros() as usize & (GROUP_SIZE - 1);
+                let lane = rays.trailing_zeros() as usize & (PACKET_SIZE - 1);
                 rays &= rays - 1;
                 let Some(member) = self.members.get_mut(lane) else {
                     break;
