@@ -88,15 +88,31 @@ pub fn splat_all<const N: usize, L: Lanes<N>>([x, y, z]: [f32; 3]) -> [L; 3] {
     [L::splat(x), L::splat(y), L::splat(z)]
 }
 
+/// Asks for all cache lines of something before they are needed.
+#[inline(always)]
+pub(crate) fn prefetch_all<T>(item: &T) {
+    const LINE: usize = 64;
+    let first = std::ptr::from_ref(item).cast::<u8>();
+    for line in 0..size_of::<T>().div_ceil(LINE) {
+        prefetch_at(first.wrapping_add(line * LINE));
+    }
+}
+
 /// Asks for a cache line before it is needed; does nothing where there is no such instruction.
 #[inline(always)]
 pub(crate) fn prefetch<T>(item: &T) {
+    prefetch_at(std::ptr::from_ref(item).cast());
+}
+
+#[inline(always)]
+fn prefetch_at(address: *const u8) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: SSE is part of x86-64; a prefetch reads nothing that the program can see.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(item).cast()) };
+        // SAFETY: SSE is part of x86-64; a prefetch reads nothing that the program can see and
+        // may be given any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = item;
+    let _ = address;
 }

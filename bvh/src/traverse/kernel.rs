@@ -305,6 +305,19 @@ pub(crate) fn closest<
     best.candidate()
 }
 
+/// In which order children are pushed: the nearest last; by area where any hit will do, which finds one sooner.
+#[inline(always)]
+pub(super) fn order_of<const ANY: bool, const N: usize, const W: usize>(
+    node: &Node<N, W>,
+    octant: usize,
+) -> u64 {
+    if ANY {
+        Node::<N, W>::SLOT_ORDER
+    } else {
+        node.order(octant)
+    }
+}
+
 /// Visits what waits on the stack and keeps the closest hit; with `ANY` no more after the first.
 #[inline(always)]
 pub(super) fn follow<
@@ -329,7 +342,7 @@ pub(super) fn follow<
         if distance > best.t {
             continue;
         }
-        let order = |node: &Node<N, W>| node.order(ray.octant);
+        let order = |node: &Node<N, W>| order_of::<ANY, N, W>(node, ray.octant);
         let Some(leaf) = descend(
             tree,
             boxes,

@@ -9,7 +9,7 @@
 //! that answers are those of one ray at a time to the last bit.
 
 use super::{
-    kernel::{Best, BoxLanes, Candidate, RaySetup, follow},
+    kernel::{Best, BoxLanes, Candidate, RaySetup, follow, order_of},
     triangle::{NODE_PAD, TriangleTest},
 };
 use crate::{
@@ -80,10 +80,10 @@ impl RayLanes {
     ) -> (R, u32) {
         let mut enter = R::load(&self.t_min);
         let mut leave = R::load(&self.t_max);
-        for axis in 0..3 {
+        for (axis, near_plane) in near_plane.into_iter().enumerate() {
             let reciprocal = R::load(&self.reciprocal[axis]);
-            let near = R::splat(node.planes[near_plane[axis]][slot]);
-            let far = R::splat(node.planes[near_plane[axis] ^ 1][slot]);
+            let near = R::splat(node.planes[near_plane][slot]);
+            let far = R::splat(node.planes[near_plane ^ 1][slot]);
             enter = enter.max(near.mul_add(reciprocal, R::load(&self.near_addend[axis])));
             leave = leave.min(far.mul_add(reciprocal, R::load(&self.far_addend[axis])));
         }
@@ -277,7 +277,7 @@ impl<const N: usize, P> Packets<N, P> {
             if rays.count_ones() > TOO_FEW && !reference.is_leaf() {
                 let node = &tree.nodes[reference.0 as usize];
                 let boxes = bundle.test(node, t_max);
-                let order = node.order(octant);
+                let order = order_of::<ANY, N, W>(node, octant);
                 for k in 0..N as u32 {
                     let slot = (order >> (k * N.trailing_zeros())) as usize & (N - 1);
                     if boxes >> slot & 1 == 0 {

@@ -8,14 +8,14 @@
 //! bit, however many are in flight and in whatever order they come.
 
 use super::{
-    kernel::{Best, BoxLanes, Candidate, RaySetup},
+    kernel::{Best, BoxLanes, Candidate, RaySetup, order_of},
     packet::{PACKET_SIZE, Packets, go_side_by_side},
     triangle::TriangleTest,
 };
 use crate::{
     layout::{block::Block, node::ChildRef, tree::Tree},
     ray::Ray,
-    simd::{Lanes, PushChildren, prefetch, stack::Stack},
+    simd::{Lanes, PushChildren, prefetch_all, stack::Stack},
 };
 
 /// Most rays in flight: more than a core can have in its queues of misses.
@@ -153,7 +153,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
             let node = &tree.nodes[reference.0 as usize];
             let (enter, mask) = self.boxes.test(node, self.best.t);
             if mask != 0 {
-                let order = node.order(self.ray.octant());
+                let order = order_of::<ANY, N, W>(node, self.ray.octant());
                 enter.push_children(mask, &node.children, order, &mut self.stack);
             }
         }
@@ -169,14 +169,10 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
 fn ask_for<const N: usize, const W: usize, B>(tree: &Tree<N, W, B>, reference: ChildRef) {
     if reference.is_leaf() {
         if let Some(block) = tree.blocks.get(reference.blocks().start) {
-            prefetch(block);
+            prefetch_all(block);
         }
     } else if let Some(node) = tree.nodes.get(reference.0 as usize) {
-        // A plane of eight children is half a line.
-        for planes in node.planes.chunks_exact(2) {
-            prefetch(&planes[0]);
-        }
-        prefetch(&node.children);
+        prefetch_all(node);
     }
 }
 
