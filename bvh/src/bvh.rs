@@ -21,7 +21,7 @@ use crate::{
     simd::Isa,
     stats::TreeStats,
     traverse::{
-        kernel::{Candidate, Count, RaySetup, power_of_two_below},
+        kernel::{Candidate, RaySetup, Watch, power_of_two_below},
         stream::{self, Waiting},
     },
 };
@@ -271,26 +271,26 @@ impl Bvh {
     #[must_use]
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_hit_counted(ray, &mut ())
+        self.closest_hit_watched(ray, &mut ())
     }
 
     /// The closest hit of a ray; adds what it took to `work`.
     #[must_use]
     pub fn closest_hit_with_work(&self, ray: &Ray, work: &mut Work) -> Option<Hit> {
-        self.closest_hit_counted(ray, work)
+        self.closest_hit_watched(ray, work)
     }
 
     /// Whether a ray hits anything.
     #[must_use]
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.any_hit_counted(ray, &mut ())
+        self.any_hit_watched(ray, &mut ())
     }
 
     /// Whether a ray hits anything; adds what it took to `work`.
     #[must_use]
     pub fn any_hit_with_work(&self, ray: &Ray, work: &mut Work) -> bool {
-        self.any_hit_counted(ray, work)
+        self.any_hit_watched(ray, work)
     }
 
     /// The closest hits of many rays, `hits[i]` becoming that of `rays[i]`: those of
@@ -346,18 +346,18 @@ impl Bvh {
     }
 
     #[inline]
-    fn closest_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> Option<Hit> {
+    fn closest_hit_watched<O: Watch>(&self, ray: &Ray, watch: &mut O) -> Option<Hit> {
         let setup = RaySetup::new(ray, self.scale)?;
-        let candidate = self.tree.closest(self.isa, &setup, count)?;
+        let candidate = self.tree.closest(self.isa, &setup, watch)?;
         Some(hit_of(&candidate, &setup, &self.first_ids))
     }
 
     #[inline]
-    fn any_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> bool {
+    fn any_hit_watched<O: Watch>(&self, ray: &Ray, watch: &mut O) -> bool {
         let Some(setup) = RaySetup::new(ray, self.scale) else {
             return false;
         };
-        self.tree.any(self.isa, &setup, count)
+        self.tree.any(self.isa, &setup, watch)
     }
 }
 

@@ -13,7 +13,7 @@ use super::{avx2, avx512};
 use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
-        kernel::{self, Candidate, Count, RaySetup},
+        kernel::{self, Candidate, RaySetup, Watch},
         stream::{self, Waiting},
         triangle::TriangleTest,
     },
@@ -69,11 +69,11 @@ impl Width<16> for Widths {
 
 /// The closest hit of a ray with a tree.
 #[inline]
-pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
     isa: Isa,
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<Candidate>
 where
     Widths: Width<N>,
@@ -81,23 +81,23 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
-        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, C>(tree, ray, count) },
+        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, O>(tree, ray, watch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above, for `Isa::Avx512`.
-        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, C>(tree, ray, count) },
-        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(
-            tree, ray, count,
+        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, O>(tree, ray, watch) },
+        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(
+            tree, ray, watch,
         ),
     }
 }
 
 /// Whether a ray hits anything in a tree.
 #[inline]
-pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
     isa: Isa,
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> bool
 where
     Widths: Width<N>,
@@ -105,11 +105,11 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, C>(tree, ray, count) },
+        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, O>(tree, ray, watch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, C>(tree, ray, count) },
-        _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, O>(tree, ray, watch) },
+        _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(tree, ray, watch),
     }
 }
 
@@ -190,30 +190,30 @@ macro_rules! entries {
         }
 
         #[target_feature(enable = $features)]
-        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
             tree: &Tree<N, W, B>,
             ray: &RaySetup,
-            count: &mut C,
+            watch: &mut O,
         ) -> Option<Candidate>
         where
             Widths: Width<N>,
         {
-            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
-                tree, ray, count,
+            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O>(
+                tree, ray, watch,
             )
         }
 
         #[target_feature(enable = $features)]
-        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
             tree: &Tree<N, W, B>,
             ray: &RaySetup,
-            count: &mut C,
+            watch: &mut O,
         ) -> bool
         where
             Widths: Width<N>,
         {
-            kernel::any::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
-                tree, ray, count,
+            kernel::any::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O>(
+                tree, ray, watch,
             )
         }
 

@@ -147,24 +147,25 @@ pub(crate) struct Candidate {
     pub(crate) id: u32,
 }
 
-/// Counts work, or does nothing at no cost.
-pub(crate) trait Count {
-    fn node(&mut self);
-    fn block(&mut self);
-}
-
-impl Count for () {
+/// What else is to be done on the way: nothing, which costs nothing, or counting work.
+pub(crate) trait Watch {
+    /// A node is visited.
     #[inline(always)]
     fn node(&mut self) {}
+
+    /// A block is tested.
     #[inline(always)]
     fn block(&mut self) {}
 }
 
-impl Count for Work {
+impl Watch for () {}
+
+impl Watch for Work {
     #[inline(always)]
     fn node(&mut self) {
         self.nodes += 1;
     }
+
     #[inline(always)]
     fn block(&mut self) {
         self.blocks += 1;
@@ -245,17 +246,17 @@ impl<L> BoxLanes<L> {
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
 #[inline(always)]
-fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, C: Count>(
+fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, O: Watch>(
     tree: &Tree<N, W, B>,
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
     t_max: f32,
     order: impl Fn(&Node<N, W>) -> u64,
     stack: &mut Stack<N>,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<ChildRef> {
     while !reference.is_leaf() {
-        count.node();
+        watch.node();
         let node = &tree.nodes[reference.0 as usize];
         let (enter, mask) = boxes.test(node, t_max);
         reference = if mask & mask.wrapping_sub(1) != 0 {
@@ -279,11 +280,11 @@ pub(crate) fn closest<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    C: Count,
+    O: Watch,
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<Candidate> {
     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
@@ -306,12 +307,12 @@ pub(crate) fn closest<
             best.t,
             order,
             &mut stack,
-            count,
+            watch,
         ) else {
             continue;
         };
         for block in &tree.blocks[leaf.blocks()] {
-            count.block();
+            watch.block();
             let hits = A::test(ray, &prepared, block, &tree.points, best.t);
             if hits.mask != 0 {
                 best.keep_first(&hits, block.ids());
@@ -395,11 +396,11 @@ pub(crate) fn any<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    C: Count,
+    O: Watch,
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> bool {
     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
@@ -418,12 +419,12 @@ pub(crate) fn any<
             ray.t_max,
             order,
             &mut stack,
-            count,
+            watch,
         ) else {
             continue;
         };
         for block in &tree.blocks[leaf.blocks()] {
-            count.block();
+            watch.block();
             if A::test(ray, &prepared, block, &tree.points, ray.t_max).mask != 0 {
                 return true;
             }
