@@ -147,8 +147,12 @@ pub(crate) struct Candidate {
     pub(crate) id: u32,
 }
 
-/// What else is to be done on the way: nothing, which costs nothing, or counting work.
+/// What else is to be done on the way: nothing, which costs nothing, counting work, or asking about
+/// hits.
 pub(crate) trait Watch {
+    /// Whether it is to be asked about hits at all.
+    const ASKS: bool = false;
+
     /// A node is visited.
     #[inline(always)]
     fn node(&mut self) {}
@@ -156,6 +160,13 @@ pub(crate) trait Watch {
     /// A block is tested.
     #[inline(always)]
     fn block(&mut self) {}
+
+    /// Whether a hit counts as one. A function of the hit: it may be asked of hits that are not the
+    /// closest, in no certain order.
+    #[inline(always)]
+    fn accepts(&mut self, _: &Candidate) -> bool {
+        true
+    }
 }
 
 impl Watch for () {}
@@ -169,6 +180,19 @@ impl Watch for Work {
     #[inline(always)]
     fn block(&mut self) {
         self.blocks += 1;
+    }
+}
+
+/// Asks a function of the caller's. It is `dyn`, so that there is one kernel for all callers: what
+/// it asks costs more than the call.
+pub(crate) struct Filter<'a>(pub(crate) &'a mut dyn FnMut(&Candidate) -> bool);
+
+impl Watch for Filter<'_> {
+    const ASKS: bool = true;
+
+    #[inline(always)]
+    fn accepts(&mut self, candidate: &Candidate) -> bool {
+        (self.0)(candidate)
     }
 }
 
@@ -315,7 +339,7 @@ pub(crate) fn closest<
             watch.block();
             let hits = A::test(ray, &prepared, block, &tree.points, best.t);
             if hits.mask != 0 {
-                best.keep_first(&hits, block.ids());
+                best.keep_first_accepted(&hits, block.ids(), watch);
             }
         }
     }
@@ -346,17 +370,34 @@ impl Best {
 
     #[inline(always)]
     pub(super) fn candidate(&self) -> Option<Candidate> {
-        (self.id != u32::MAX).then(|| Candidate {
+        (self.id != u32::MAX).then(|| self.weighed())
+    }
+
+    /// With weights divided.
+    #[inline(always)]
+    fn weighed(&self) -> Candidate {
+        Candidate {
             u: self.u / self.den,
             v: self.v / self.den,
             t: self.t,
             id: self.id,
-        })
+        }
     }
 
     /// Takes over the lanes that precede it.
     #[inline(always)]
     pub(super) fn keep_first<T: Lanes<4>>(&mut self, hits: &BlockHits<T>, ids: &[u32; 4]) {
+        self.keep_first_accepted(hits, ids, &mut ());
+    }
+
+    /// Takes over the lanes that precede it and are accepted.
+    #[inline(always)]
+    fn keep_first_accepted<T: Lanes<4>, O: Watch>(
+        &mut self,
+        hits: &BlockHits<T>,
+        ids: &[u32; 4],
+        watch: &mut O,
+    ) {
         let (t, u, v, den) = (
             hits.t.store(),
             hits.u.store(),
@@ -368,13 +409,16 @@ impl Best {
             let lane = lanes.trailing_zeros() as usize & 3;
             lanes &= lanes - 1;
             if precedes((t[lane], ids[lane]), (self.t, self.id)) {
-                *self = Self {
+                let first = Self {
                     t: t[lane],
                     u: u[lane],
                     v: v[lane],
                     den: den[lane],
                     id: ids[lane],
                 };
+                if !O::ASKS || watch.accepts(&first.weighed()) {
+                    *self = first;
+                }
             }
         }
     }
@@ -425,7 +469,16 @@ pub(crate) fn any<
         };
         for block in &tree.blocks[leaf.blocks()] {
             watch.block();
-            if A::test(ray, &prepared, block, &tree.points, ray.t_max).mask != 0 {
+            let hits = A::test(ray, &prepared, block, &tree.points, ray.t_max);
+            if hits.mask == 0 {
+                continue;
+            }
+            if !O::ASKS {
+                return true;
+            }
+            let mut first = Best::none(f32::INFINITY);
+            first.keep_first_accepted(&hits, block.ids(), watch);
+            if first.candidate().is_some() {
                 return true;
             }
         }

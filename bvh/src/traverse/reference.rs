@@ -26,6 +26,20 @@ pub fn closest_hit(
     ray: &Ray,
     accuracy: Accuracy,
 ) -> Result<Option<Hit>, BuildError> {
+    closest_hit_where(meshes, ray, accuracy, |_| true)
+}
+
+/// The closest of the hits that `accept` takes, as
+/// [`Bvh::closest_hit_where`](crate::Bvh::closest_hit_where) gives it, by asking about every hit.
+///
+/// # Errors
+/// As [`Bvh::build`](crate::Bvh::build), for the same meshes.
+pub fn closest_hit_where(
+    meshes: &[&TriangleMesh],
+    ray: &Ray,
+    accuracy: Accuracy,
+    mut accept: impl FnMut(&Hit) -> bool,
+) -> Result<Option<Hit>, BuildError> {
     let triangle = match accuracy {
         Accuracy::Fast => fast_triangle,
         Accuracy::Robust => robust_triangle,
@@ -50,7 +64,9 @@ pub fn closest_hit(
                 v,
                 id: first_id + primitive_id,
             };
-            if best.is_none_or(|best| precedes((candidate.t, candidate.id), (best.t, best.id))) {
+            if accept(&hit_of(&candidate, &setup, &first_ids))
+                && best.is_none_or(|best| precedes((candidate.t, candidate.id), (best.t, best.id)))
+            {
                 best = Some(candidate);
             }
         }
