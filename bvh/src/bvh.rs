@@ -329,7 +329,7 @@ impl Bvh {
     ) -> Option<Hit> {
         let setup = self.setup(ray)?;
         self.closest_where(&setup, &mut |candidate| {
-            accept(&hit_of(candidate, &setup, &self.first_ids))
+            accept(&self.hit_of(candidate, &setup))
         })
     }
 
@@ -339,7 +339,7 @@ impl Bvh {
     pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> bool {
         self.setup(ray).is_some_and(|setup| {
             self.any_where(&setup, &mut |candidate| {
-                accept(&hit_of(candidate, &setup, &self.first_ids))
+                accept(&self.hit_of(candidate, &setup))
             })
         })
     }
@@ -347,7 +347,7 @@ impl Bvh {
     // Not generic: the kernels with a filter are compiled with this crate, not with each caller.
 
     #[inline(never)]
-    fn closest_where(
+    pub(crate) fn closest_where(
         &self,
         setup: &RaySetup,
         accept: &mut dyn FnMut(&Candidate) -> bool,
@@ -356,7 +356,11 @@ impl Bvh {
     }
 
     #[inline(never)]
-    fn any_where(&self, setup: &RaySetup, accept: &mut dyn FnMut(&Candidate) -> bool) -> bool {
+    pub(crate) fn any_where(
+        &self,
+        setup: &RaySetup,
+        accept: &mut dyn FnMut(&Candidate) -> bool,
+    ) -> bool {
         self.any_hit_of(setup, &mut Filter(accept))
     }
 
@@ -414,19 +418,25 @@ impl Bvh {
 
     /// A ray in the space of the tree; `None` if it can hit nothing.
     #[inline]
-    fn setup(&self, ray: &Ray) -> Option<RaySetup> {
+    pub(crate) fn setup(&self, ray: &Ray) -> Option<RaySetup> {
         RaySetup::new(ray, self.scale)
     }
 
     #[inline]
-    fn closest_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> Option<Hit> {
+    pub(crate) fn closest_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> Option<Hit> {
         let candidate = self.tree.closest(self.isa, setup, watch)?;
-        Some(hit_of(&candidate, setup, &self.first_ids))
+        Some(self.hit_of(&candidate, setup))
     }
 
     #[inline]
-    fn any_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> bool {
+    pub(crate) fn any_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> bool {
         self.tree.any(self.isa, setup, watch)
+    }
+
+    /// A candidate of its kernels as a hit.
+    #[inline]
+    pub(crate) fn hit_of(&self, candidate: &Candidate, setup: &RaySetup) -> Hit {
+        hit_of(candidate, setup, &self.first_ids)
     }
 }
 

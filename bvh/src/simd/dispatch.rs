@@ -134,6 +134,27 @@ pub(crate) fn all<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
     }
 }
 
+/// Visits the primitives that a ray meets, about from the nearest to the farthest.
+#[inline]
+pub(crate) fn visit<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
+    isa: Isa,
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    meet: &mut dyn FnMut(&Candidate) -> f32,
+) where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`, the tree being that of a `BoxBvh` (`BoxBvh::with_isa`).
+        Isa::Avx2 => unsafe { visit_avx2::<N, W, B, A>(tree, ray, meet) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, for `Isa::Avx512`.
+        Isa::Avx512 => unsafe { visit_avx512::<N, W, B, A>(tree, ray, meet) },
+        _ => kernel::visit::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(tree, ray, meet),
+    }
+}
+
 /// Traces a batch of rays with a tree, several in flight.
 #[inline]
 pub(crate) fn stream<
@@ -164,10 +185,10 @@ pub(crate) fn stream<
     }
 }
 
-/// The four entries of an instruction set.
+/// The five entries of an instruction set.
 #[cfg(target_arch = "x86_64")]
 macro_rules! entries {
-    ($closest:ident, $any:ident, $all:ident, $stream:ident, $lanes:ident, $features:literal) => {
+    ($closest:ident, $any:ident, $all:ident, $visit:ident, $stream:ident, $lanes:ident, $features:literal) => {
         #[target_feature(enable = $features)]
         fn $stream<
             const ANY: bool,
@@ -228,6 +249,17 @@ macro_rules! entries {
         {
             kernel::all::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(tree, ray, visit);
         }
+
+        #[target_feature(enable = $features)]
+        fn $visit<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
+            tree: &Tree<N, W, B>,
+            ray: &RaySetup,
+            meet: &mut dyn FnMut(&Candidate) -> f32,
+        ) where
+            Widths: Width<N>,
+        {
+            kernel::visit::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(tree, ray, meet);
+        }
     };
 }
 
@@ -236,6 +268,7 @@ entries!(
     closest_avx2,
     any_avx2,
     all_avx2,
+    visit_avx2,
     stream_avx2,
     Avx2,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
@@ -246,6 +279,7 @@ entries!(
     closest_avx512,
     any_avx512,
     all_avx512,
+    visit_avx512,
     stream_avx512,
     Avx512,
     "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"

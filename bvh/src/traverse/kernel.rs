@@ -87,14 +87,13 @@ impl RaySetup {
         });
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
         let unscale = [direction_scale, lift / scale];
-        let scaled = |t: f32| t / unscale[1] / unscale[0];
         Some(Self {
             origin: origin.to_array(),
             direction: direction.to_array(),
             reciprocal,
             margin,
-            t_min: scaled(t_min),
-            t_max: scaled(ray.t_max),
+            t_min: scaled(t_min, unscale),
+            t_max: scaled(ray.t_max, unscale),
             octant: (0..3)
                 .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
                 .sum(),
@@ -113,6 +112,33 @@ impl RaySetup {
     pub(crate) fn unscaled(&self, t: f32) -> f32 {
         t * self.unscale[0] * self.unscale[1]
     }
+
+    /// A distance in the caller's unit along the scaled ray.
+    #[inline]
+    pub(crate) fn scaled(&self, t: f32) -> f32 {
+        scaled(t, self.unscale)
+    }
+
+    /// The same ray up to a distance in the caller's unit. Where distances are so small or large
+    /// that scaling rounds them, and a hit at `t` might be lost, it is not shortened.
+    #[inline]
+    pub(crate) fn limited_to(self, t: f32) -> Self {
+        let limit = self.scaled(t);
+        // Scaling keeps order, so this asks it of all distances beyond the limit.
+        if limit < self.t_max && self.unscaled(limit.next_up()) > t {
+            Self {
+                t_max: limit,
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+}
+
+#[inline]
+fn scaled(t: f32, unscale: [f32; 2]) -> f32 {
+    t / unscale[1] / unscale[0]
 }
 
 /// Two powers of two whose product brings the largest component of a direction into 1/2..2, where
@@ -537,6 +563,82 @@ pub(crate) fn all<
                 let lane = lanes.trailing_zeros() as usize & 3;
                 lanes &= lanes - 1;
                 visit(Candidate {
+                    t: t[lane],
+                    u: u[lane] / den[lane],
+                    v: v[lane] / den[lane],
+                    id: block.ids()[lane],
+                });
+            }
+        }
+    }
+}
+
+/// Visits the primitives that a ray meets, about from the nearest to the farthest. `meet` tells up
+/// to which distance others are still of interest; those behind it are passed by.
+///
+/// `meet` is `dyn`: what it does, the way through another tree, costs far more than the call.
+#[inline(always)]
+pub(crate) fn visit<
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: PushChildren<N>,
+    T: Lanes<4>,
+>(
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    meet: &mut dyn FnMut(&Candidate) -> f32,
+) {
+    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let prepared = A::prepare::<T>(ray);
+    let mut t_max = ray.t_max;
+    let mut stack = Stack::<N>::new();
+    stack.push_if(
+        u32::from(!tree.nodes.is_empty()),
+        ChildRef::inner(0).0,
+        ray.t_min,
+    );
+    while let Some((reference, distance)) = stack.pop() {
+        if distance > t_max {
+            continue;
+        }
+        let order = |node: &Node<N, W>| node.order(ray.octant);
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            t_max,
+            order,
+            &mut stack,
+            &mut (),
+        ) else {
+            continue;
+        };
+        for block in &tree.blocks[leaf.blocks()] {
+            let hits = A::test(ray, &prepared, block, &tree.points, t_max);
+            let mut lanes = hits.mask;
+            if lanes == 0 {
+                continue;
+            }
+            let (t, u, v, den) = (
+                hits.t.store(),
+                hits.u.store(),
+                hits.v.store(),
+                hits.den.store(),
+            );
+            while lanes != 0 {
+                let mut lane = lanes.trailing_zeros() as usize & 3;
+                for other in lane + 1..4 {
+                    if lanes >> other & 1 != 0 && t[other] < t[lane] {
+                        lane = other;
+                    }
+                }
+                lanes &= !(1 << lane);
+                if t[lane] > t_max {
+                    break;
+                }
+                t_max = meet(&Candidate {
                     t: t[lane],
                     u: u[lane] / den[lane],
                     v: v[lane] / den[lane],
