@@ -501,7 +501,8 @@ fn world_box(bounds: &Aabb, matrix: &DMat3, translation: DVec3, condition: f64) 
 
 /// The largest f32 not above; what is out of range stays finite, and the tree refuses it.
 fn rounded_down(x: f64) -> f32 {
-    let nearest = x.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32;
+    let x = x.clamp(f64::from(f32::MIN), f64::from(f32::MAX));
+    let nearest = x as f32;
     if f64::from(nearest) > x {
         nearest.next_down()
     } else {
