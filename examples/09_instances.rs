@@ -13,8 +13,6 @@ use raywright::bvh::{
 const SEEN: u32 = 0b01;
 const CASTS_SHADOW: u32 = 0b10;
 
-const CARDS: u32 = 1;
-
 /// A parallelogram around a centre.
 fn card(centre: Vec3, a: Vec3, b: Vec3) -> Result<TriangleMesh, Box<dyn std::error::Error>> {
     let corners = [-a - b, a - b, a + b, b - a]
@@ -28,7 +26,8 @@ fn is_opaque(hit: &InstanceHit) -> bool {
     let (u, v) = (hit.hit.u, hit.hit.v);
     let (x, y) = [(u + v, v), (u, u + v)][hit.hit.primitive_id as usize];
     let radius = (2.0 * x - 1.0).hypot(2.0 * y - 1.0);
-    hit.hit.geometry_id != CARDS || (radius < 1.0 && (radius * 10.0) as u32 % 3 != 0)
+    // The stem has no holes.
+    hit.hit.geometry_id == 0 || (radius < 1.0 && (radius * 10.0) as u32 % 3 != 0)
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -84,8 +83,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         });
         println!("{}", line.collect::<String>());
     }
-    let [seen, in_shadow, of_cards, of_seen] = counts;
-    println!("of {seen} points, in shadow: {in_shadow};");
-    println!("if cards were opaque: {of_cards}; if only what is seen cast shadows: {of_seen}");
+    println!("of {} points, in shadow: {};", counts[0], counts[1]);
+    println!("if cards were opaque: {};", counts[2]);
+    println!("if only what is seen cast shadows: {}", counts[3]);
     Ok(())
 }

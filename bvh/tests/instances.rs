@@ -30,7 +30,7 @@ fn object_trees(objects: &Objects<'_>, variant: usize) -> Vec<Arc<Bvh>> {
         params.accuracy = *accuracy;
         params.branching_factor = [8, 2, 16, 4][number % 4];
         params.quality = [Quality::BinnedSah, Quality::Morton][number / 2 % 2];
-        if number % 3 == 0 {
+        if number.is_multiple_of(3) {
             params.leaf_format = LeafFormat::Compact;
         }
         let tree = Bvh::build(meshes, &params).unwrap();
@@ -70,12 +70,14 @@ fn hit_bits(hit: Option<InstanceHit>) -> Option<(u32, common::Bits)> {
     hit.map(|hit| (hit.instance_id, bits(Some(hit.hit))))
 }
 
+type Accept = fn(&InstanceHit) -> bool;
+
 fn by_ids(hit: &InstanceHit) -> bool {
     !(hit.instance_id + hit.hit.primitive_id).is_multiple_of(3)
 }
 
 fn by_bits(hit: &InstanceHit) -> bool {
-    (hit.hit.t.to_bits() ^ hit.hit.u.to_bits()) % 2 == 0
+    (hit.hit.t.to_bits() ^ hit.hit.u.to_bits()).is_multiple_of(2)
 }
 
 /// Compares all trees with the slow twin; gives how many hits there were.
@@ -88,13 +90,12 @@ fn check(
     let slices: Vec<_> = objects.iter().map(|(m, a)| (m.as_slice(), *a)).collect();
     let mut hits = 0;
     for (ray, mask) in rays {
-        let expected = |accept: fn(&InstanceHit) -> bool| {
+        let expected = |accept: Accept| {
             let hit = reference::closest_instance_hit_where(&slices, instances, ray, *mask, accept);
             hit.unwrap()
         };
         let plain = expected(|_| true);
-        let filters: [(fn(&InstanceHit) -> bool, _); 2] =
-            [(by_ids, expected(by_ids)), (by_bits, expected(by_bits))];
+        let filters: [(Accept, _); 2] = [(by_ids, expected(by_ids)), (by_bits, expected(by_bits))];
         hits += usize::from(plain.is_some());
         for tree in &trees {
             let context = format!("{} {:?} {ray:?} {mask:x}", tree.isa(), tree.params());
