@@ -52,7 +52,7 @@ fn by_distance(hit: &Hit) -> bool {
 
 /// Keeps what bits say that have nothing to do with geometry: any other bit is another answer.
 fn by_bits(hit: &Hit) -> bool {
-    (hit.t.to_bits() ^ hit.u.to_bits() ^ hit.v.to_bits()) % 3 == 0
+    (hit.t.to_bits() ^ hit.u.to_bits() ^ hit.v.to_bits()).is_multiple_of(3)
 }
 
 type Accept = fn(&Hit) -> bool;
