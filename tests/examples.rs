@@ -105,3 +105,18 @@ fn tuning_while_one_renders() {
     assert!(printed.contains("the camera turns round"), "{printed}");
     assert!(printed.contains("best: Some(BuildParams"), "{printed}");
 }
+
+#[test]
+fn instances() {
+    let Some(printed) = run("09_instances") else {
+        return;
+    };
+    let counts: Vec<u32> = printed
+        .split([' ', ',', ';', '\n'])
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    assert!(
+        matches!(counts[..], [_, cut, opaque, seen] if 0 < seen && seen < cut && cut < opaque),
+        "{printed}"
+    );
+}

@@ -18,7 +18,7 @@ use crate::{
     stats::{TreeStats, sah_cost},
     traverse::{
         fast::Fast,
-        kernel::{Candidate, Count, RaySetup},
+        kernel::{Candidate, RaySetup, Watch},
         robust::Robust,
         stream::{Together, Waiting},
     },
@@ -89,18 +89,18 @@ impl AnyTree {
     }
 
     #[inline]
-    pub(crate) fn closest<C: Count>(
+    pub(crate) fn closest<O: Watch>(
         &self,
         isa: Isa,
         ray: &RaySetup,
-        count: &mut C,
+        watch: &mut O,
     ) -> Option<Candidate> {
-        for_width!(self, tree => tree.closest(isa, ray, count))
+        for_width!(self, tree => tree.closest(isa, ray, watch))
     }
 
     #[inline]
-    pub(crate) fn any<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> bool {
-        for_width!(self, tree => tree.any(isa, ray, count))
+    pub(crate) fn any<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> bool {
+        for_width!(self, tree => tree.any(isa, ray, watch))
     }
 
     #[inline]
@@ -166,24 +166,24 @@ where
     }
 
     #[inline]
-    fn closest<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> Option<Candidate> {
+    fn closest<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> Option<Candidate> {
         use dispatch::closest;
         match self {
-            Self::Fast(tree) => closest::<N, W, _, Fast, C>(isa, tree, ray, count),
-            Self::Robust(tree) => closest::<N, W, _, Robust, C>(isa, tree, ray, count),
-            Self::CompactFast(tree) => closest::<N, W, _, Fast, C>(isa, tree, ray, count),
-            Self::CompactRobust(tree) => closest::<N, W, _, Robust, C>(isa, tree, ray, count),
+            Self::Fast(tree) => closest::<N, W, _, Fast, O>(isa, tree, ray, watch),
+            Self::Robust(tree) => closest::<N, W, _, Robust, O>(isa, tree, ray, watch),
+            Self::CompactFast(tree) => closest::<N, W, _, Fast, O>(isa, tree, ray, watch),
+            Self::CompactRobust(tree) => closest::<N, W, _, Robust, O>(isa, tree, ray, watch),
         }
     }
 
     #[inline]
-    fn any<C: Count>(&self, isa: Isa, ray: &RaySetup, count: &mut C) -> bool {
+    fn any<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> bool {
         use dispatch::any;
         match self {
-            Self::Fast(tree) => any::<N, W, _, Fast, C>(isa, tree, ray, count),
-            Self::Robust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
-            Self::CompactFast(tree) => any::<N, W, _, Fast, C>(isa, tree, ray, count),
-            Self::CompactRobust(tree) => any::<N, W, _, Robust, C>(isa, tree, ray, count),
+            Self::Fast(tree) => any::<N, W, _, Fast, O>(isa, tree, ray, watch),
+            Self::Robust(tree) => any::<N, W, _, Robust, O>(isa, tree, ray, watch),
+            Self::CompactFast(tree) => any::<N, W, _, Fast, O>(isa, tree, ray, watch),
+            Self::CompactRobust(tree) => any::<N, W, _, Robust, O>(isa, tree, ray, watch),
         }
     }
 

@@ -91,6 +91,10 @@ impl BoxTree {
         for_width!(self, tree => dispatch::all::<_, _, _, BoxTest>(isa, tree, ray, visit));
     }
 
+    fn visit(&self, isa: Isa, ray: &RaySetup, meet: &mut dyn FnMut(&Candidate) -> f32) {
+        for_width!(self, tree => dispatch::visit::<_, _, _, BoxTest>(isa, tree, ray, meet));
+    }
+
     fn recycle(self, spares: &mut Spares) {
         for_width!(self, tree => tree.recycle(spares));
     }
@@ -180,6 +184,18 @@ impl BoxBvh {
             });
             hits.sort_unstable_by(BoxHit::order);
         }
+    }
+
+    /// A ray in the space of the tree; `None` if it can enter nothing.
+    pub(crate) fn setup(&self, ray: &Ray) -> Option<RaySetup> {
+        RaySetup::new(ray, self.scale)
+    }
+
+    /// Visits the boxes that a ray of [`Self::setup`] enters, about in the order of entry. `meet`
+    /// is given entry and exit, scaled, and tells up to which distance of entry others are still of
+    /// interest.
+    pub(crate) fn visit(&self, ray: &RaySetup, meet: &mut dyn FnMut(&Candidate) -> f32) {
+        self.tree.visit(self.isa, ray, meet);
     }
 
     /// The smallest box around all boxes; empty if there are none.

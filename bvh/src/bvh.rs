@@ -21,7 +21,7 @@ use crate::{
     simd::Isa,
     stats::TreeStats,
     traverse::{
-        kernel::{Candidate, Count, RaySetup, power_of_two_below},
+        kernel::{Candidate, Filter, RaySetup, Watch, power_of_two_below},
         stream::{self, Together, Waiting},
     },
 };
@@ -271,26 +271,97 @@ impl Bvh {
     #[must_use]
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_hit_counted(ray, &mut ())
+        self.closest_hit_of(&self.setup(ray)?, &mut ())
     }
 
     /// The closest hit of a ray; adds what it took to `work`.
     #[must_use]
     pub fn closest_hit_with_work(&self, ray: &Ray, work: &mut Work) -> Option<Hit> {
-        self.closest_hit_counted(ray, work)
+        self.closest_hit_of(&self.setup(ray)?, work)
     }
 
     /// Whether a ray hits anything.
     #[must_use]
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.any_hit_counted(ray, &mut ())
+        self.setup(ray)
+            .is_some_and(|setup| self.any_hit_of(&setup, &mut ()))
     }
 
     /// Whether a ray hits anything; adds what it took to `work`.
     #[must_use]
     pub fn any_hit_with_work(&self, ray: &Ray, work: &mut Work) -> bool {
-        self.any_hit_counted(ray, work)
+        self.setup(ray)
+            .is_some_and(|setup| self.any_hit_of(&setup, work))
+    }
+
+    /// The closest of the hits that `accept` takes, equal distances decided as ever: a leaf whose
+    /// texture is transparent at `(u, v)` is passed, say.
+    ///
+    /// `accept` must be a function of the hit, which is to the last bit what
+    /// [`Bvh::closest_hit`] would give. It may be called for hits that are not the closest, in no
+    /// certain order, and more than once for a triangle that the build has cut.
+    ///
+    /// A mask of geometries is a filter too:
+    ///
+    /// ```
+    /// # use raywright_bvh::{Bvh, BuildParams, Ray, TriangleMesh, Vec3};
+    /// # let corners = |z| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v + Vec3::Z * z).to_vec();
+    /// # let near = TriangleMesh::new(corners(1.0), vec![[0, 1, 2]])?;
+    /// # let far = TriangleMesh::new(corners(0.0), vec![[0, 1, 2]])?;
+    /// # let ray = Ray::new([0.25, 0.25, 3.0], [0.0, 0.0, -1.0]);
+    /// let bvh = Bvh::build(&[&near, &far], &BuildParams::default())?;
+    /// let masks = [0b01_u32, 0b10];
+    /// let seen = |ray_mask: u32| {
+    ///     let hit = bvh.closest_hit_where(&ray, |hit| {
+    ///         masks[hit.geometry_id as usize] & ray_mask != 0
+    ///     });
+    ///     hit.map(|hit| hit.geometry_id)
+    /// };
+    /// assert_eq!([seen(0b11), seen(0b10), seen(0b100)], [Some(0), Some(1), None]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn closest_hit_where(
+        &self,
+        ray: &Ray,
+        mut accept: impl FnMut(&Hit) -> bool,
+    ) -> Option<Hit> {
+        let setup = self.setup(ray)?;
+        self.closest_where(&setup, &mut |candidate| {
+            accept(&self.hit_of(candidate, &setup))
+        })
+    }
+
+    /// Whether a ray has a hit that `accept` takes, which is called as by
+    /// [`Bvh::closest_hit_where`].
+    #[must_use]
+    pub fn any_hit_where(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> bool {
+        self.setup(ray).is_some_and(|setup| {
+            self.any_where(&setup, &mut |candidate| {
+                accept(&self.hit_of(candidate, &setup))
+            })
+        })
+    }
+
+    // Not generic: the kernels with a filter are compiled with this crate, not with each caller.
+
+    #[inline(never)]
+    pub(crate) fn closest_where(
+        &self,
+        setup: &RaySetup,
+        accept: &mut dyn FnMut(&Candidate) -> bool,
+    ) -> Option<Hit> {
+        self.closest_hit_of(setup, &mut Filter(accept))
+    }
+
+    #[inline(never)]
+    pub(crate) fn any_where(
+        &self,
+        setup: &RaySetup,
+        accept: &mut dyn FnMut(&Candidate) -> bool,
+    ) -> bool {
+        self.any_hit_of(setup, &mut Filter(accept))
     }
 
     /// The closest hits of many rays, `hits[i]` becoming that of `rays[i]`: those of
@@ -348,19 +419,27 @@ impl Bvh {
         self.tree.stats(&self.params)
     }
 
+    /// A ray in the space of the tree; `None` if it can hit nothing.
     #[inline]
-    fn closest_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> Option<Hit> {
-        let setup = RaySetup::new(ray, self.scale)?;
-        let candidate = self.tree.closest(self.isa, &setup, count)?;
-        Some(hit_of(&candidate, &setup, &self.first_ids))
+    pub(crate) fn setup(&self, ray: &Ray) -> Option<RaySetup> {
+        RaySetup::new(ray, self.scale)
     }
 
     #[inline]
-    fn any_hit_counted<C: Count>(&self, ray: &Ray, count: &mut C) -> bool {
-        let Some(setup) = RaySetup::new(ray, self.scale) else {
-            return false;
-        };
-        self.tree.any(self.isa, &setup, count)
+    pub(crate) fn closest_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> Option<Hit> {
+        let candidate = self.tree.closest(self.isa, setup, watch)?;
+        Some(self.hit_of(&candidate, setup))
+    }
+
+    #[inline]
+    pub(crate) fn any_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> bool {
+        self.tree.any(self.isa, setup, watch)
+    }
+
+    /// A candidate of its kernels as a hit.
+    #[inline]
+    pub(crate) fn hit_of(&self, candidate: &Candidate, setup: &RaySetup) -> Hit {
+        hit_of(candidate, setup, &self.first_ids)
     }
 }
 

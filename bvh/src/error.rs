@@ -134,6 +134,43 @@ pub enum RefitError {
     Build(#[from] BuildError),
 }
 
+/// Why no tree over instances was built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InstanceError {
+    /// An instance of a tree that was not given.
+    #[error("instance {instance} is one of tree {tree}, but there are {trees} trees")]
+    TreeOutOfRange {
+        /// Number of the instance, from 0.
+        instance: usize,
+        /// The tree that it asks for.
+        tree: usize,
+        /// How many trees there are.
+        trees: usize,
+    },
+    /// A transform with a number that is infinite or none.
+    #[error("the transform of instance {instance} is not finite")]
+    TransformNotFinite {
+        /// Number of the instance, from 0.
+        instance: usize,
+    },
+    /// A transform without an inverse in the numbers of `f32`: it is flat, or so near to it that
+    /// nothing would be left of a ray, or it makes things so small that the inverse is not finite.
+    #[error(
+        "the transform of instance {instance} cannot be inverted in f32 (condition {condition:e})"
+    )]
+    TransformNotInvertible {
+        /// Number of the instance, from 0.
+        instance: usize,
+        /// By how much errors grow on the way to the object and back: 1 for an axis-aligned
+        /// transform, at most 2²⁴ for one that is taken; not finite if there is no inverse at all.
+        condition: f64,
+    },
+    /// What a build over the boxes of the instances refuses.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+}
+
 fn join(faults: &[ParameterFault]) -> String {
     faults
         .iter()

@@ -22,6 +22,7 @@ mod build;
 mod bvh;
 mod error;
 mod hierarchy;
+mod instances;
 mod layout;
 mod mesh;
 mod params;
@@ -39,9 +40,10 @@ pub use build::{
     control::{BuildControl, ProgressFn},
 };
 pub use bvh::{Bvh, Refit};
-pub use error::{BuildError, ParameterFault, RefitError};
-pub use glam::Vec3;
+pub use error::{BuildError, InstanceError, ParameterFault, RefitError};
+pub use glam::{Affine3, Vec3};
 pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
+pub use instances::{Instance, InstanceHit, InstancedBvh};
 pub use mesh::{MeshError, TriangleMesh};
 pub use params::{
     Accuracy, BuildParams, Dynamics, LeafFormat, PARAMETERS, Parameter, ParameterRange,

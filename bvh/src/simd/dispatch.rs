@@ -13,7 +13,7 @@ use super::{avx2, avx512};
 use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
-        kernel::{self, Candidate, Count, RaySetup},
+        kernel::{self, Candidate, RaySetup, Watch},
         stream::{self, Together, Waiting},
         triangle::TriangleTest,
     },
@@ -69,11 +69,11 @@ impl Width<16> for Widths {
 
 /// The closest hit of a ray with a tree.
 #[inline]
-pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
     isa: Isa,
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<Candidate>
 where
     Widths: Width<N>,
@@ -81,23 +81,23 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
-        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, C>(tree, ray, count) },
+        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, O>(tree, ray, watch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above, for `Isa::Avx512`.
-        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, C>(tree, ray, count) },
-        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(
-            tree, ray, count,
+        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, O>(tree, ray, watch) },
+        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(
+            tree, ray, watch,
         ),
     }
 }
 
 /// Whether a ray hits anything in a tree.
 #[inline]
-pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
     isa: Isa,
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> bool
 where
     Widths: Width<N>,
@@ -105,11 +105,11 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, C>(tree, ray, count) },
+        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, O>(tree, ray, watch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, C>(tree, ray, count) },
-        _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, C>(tree, ray, count),
+        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, O>(tree, ray, watch) },
+        _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(tree, ray, watch),
     }
 }
 
@@ -131,6 +131,27 @@ pub(crate) fn all<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
         // SAFETY: as in `closest`.
         Isa::Avx512 => unsafe { all_avx512::<N, W, B, A, _>(tree, ray, visit) },
         _ => kernel::all::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(tree, ray, visit),
+    }
+}
+
+/// Visits the primitives that a ray meets, about from the nearest to the farthest.
+#[inline]
+pub(crate) fn visit<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
+    isa: Isa,
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    meet: &mut dyn FnMut(&Candidate) -> f32,
+) where
+    Widths: Width<N>,
+{
+    match isa {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as in `closest`, the tree being that of a `BoxBvh` (`BoxBvh::with_isa`).
+        Isa::Avx2 => unsafe { visit_avx2::<N, W, B, A>(tree, ray, meet) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above, for `Isa::Avx512`.
+        Isa::Avx512 => unsafe { visit_avx512::<N, W, B, A>(tree, ray, meet) },
+        _ => kernel::visit::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4>(tree, ray, meet),
     }
 }
 
@@ -171,10 +192,10 @@ pub(crate) fn stream<
     }
 }
 
-/// The four entries of an instruction set.
+/// The five entries of an instruction set.
 #[cfg(target_arch = "x86_64")]
 macro_rules! entries {
-    ($closest:ident, $any:ident, $all:ident, $stream:ident, $lanes:ident, $features:literal) => {
+    ($closest:ident, $any:ident, $all:ident, $visit:ident, $stream:ident, $lanes:ident, $features:literal) => {
         #[target_feature(enable = $features)]
         fn $stream<
             const ANY: bool,
@@ -204,30 +225,30 @@ macro_rules! entries {
         }
 
         #[target_feature(enable = $features)]
-        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
             tree: &Tree<N, W, B>,
             ray: &RaySetup,
-            count: &mut C,
+            watch: &mut O,
         ) -> Option<Candidate>
         where
             Widths: Width<N>,
         {
-            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
-                tree, ray, count,
+            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O>(
+                tree, ray, watch,
             )
         }
 
         #[target_feature(enable = $features)]
-        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, C: Count>(
+        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
             tree: &Tree<N, W, B>,
             ray: &RaySetup,
-            count: &mut C,
+            watch: &mut O,
         ) -> bool
         where
             Widths: Width<N>,
         {
-            kernel::any::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, C>(
-                tree, ray, count,
+            kernel::any::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O>(
+                tree, ray, watch,
             )
         }
 
@@ -242,6 +263,17 @@ macro_rules! entries {
         {
             kernel::all::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(tree, ray, visit);
         }
+
+        #[target_feature(enable = $features)]
+        fn $visit<const N: usize, const W: usize, B: Block, A: TriangleTest<B>>(
+            tree: &Tree<N, W, B>,
+            ray: &RaySetup,
+            meet: &mut dyn FnMut(&Candidate) -> f32,
+        ) where
+            Widths: Width<N>,
+        {
+            kernel::visit::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4>(tree, ray, meet);
+        }
     };
 }
 
@@ -250,6 +282,7 @@ entries!(
     closest_avx2,
     any_avx2,
     all_avx2,
+    visit_avx2,
     stream_avx2,
     Avx2,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
@@ -260,6 +293,7 @@ entries!(
     closest_avx512,
     any_avx512,
     all_avx512,
+    visit_avx512,
     stream_avx512,
     Avx512,
     "avx512f,avx512vl,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt"

@@ -87,14 +87,13 @@ impl RaySetup {
         });
         // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
         let unscale = [direction_scale, lift / scale];
-        let scaled = |t: f32| t / unscale[1] / unscale[0];
         Some(Self {
             origin: origin.to_array(),
             direction: direction.to_array(),
             reciprocal,
             margin,
-            t_min: scaled(t_min),
-            t_max: scaled(ray.t_max),
+            t_min: scaled(t_min, unscale),
+            t_max: scaled(ray.t_max, unscale),
             octant: (0..3)
                 .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
                 .sum(),
@@ -121,6 +120,33 @@ impl RaySetup {
     pub(crate) fn unscaled(&self, t: f32) -> f32 {
         t * self.unscale[0] * self.unscale[1]
     }
+
+    /// A distance in the caller's unit along the scaled ray.
+    #[inline]
+    pub(crate) fn scaled(&self, t: f32) -> f32 {
+        scaled(t, self.unscale)
+    }
+
+    /// The same ray up to a distance in the caller's unit. Where distances are so small or large
+    /// that scaling rounds them, and a hit at `t` might be lost, it is not shortened.
+    #[inline]
+    pub(crate) fn limited_to(self, t: f32) -> Self {
+        let limit = self.scaled(t);
+        // Scaling keeps order, so this asks it of all distances beyond the limit.
+        if limit < self.t_max && self.unscaled(limit.next_up()) > t {
+            Self {
+                t_max: limit,
+                ..self
+            }
+        } else {
+            self
+        }
+    }
+}
+
+#[inline]
+fn scaled(t: f32, unscale: [f32; 2]) -> f32 {
+    t / unscale[1] / unscale[0]
 }
 
 /// Two powers of two whose product brings the largest component of a direction into 1/2..2, where
@@ -155,27 +181,52 @@ pub(crate) struct Candidate {
     pub(crate) id: u32,
 }
 
-/// Counts work, or does nothing at no cost.
-pub(crate) trait Count {
-    fn node(&mut self);
-    fn block(&mut self);
-}
+/// What else is to be done on the way: nothing, which costs nothing, counting work, or asking about
+/// hits.
+pub(crate) trait Watch {
+    /// Whether it is to be asked about hits at all.
+    const ASKS: bool = false;
 
-impl Count for () {
+    /// A node is visited.
     #[inline(always)]
     fn node(&mut self) {}
+
+    /// A block is tested.
     #[inline(always)]
     fn block(&mut self) {}
+
+    /// Whether a hit counts as one. A function of the hit: it may be asked of hits that are not the
+    /// closest, in no certain order.
+    #[inline(always)]
+    fn accepts(&mut self, _: &Candidate) -> bool {
+        true
+    }
 }
 
-impl Count for Work {
+impl Watch for () {}
+
+impl Watch for Work {
     #[inline(always)]
     fn node(&mut self) {
         self.nodes += 1;
     }
+
     #[inline(always)]
     fn block(&mut self) {
         self.blocks += 1;
+    }
+}
+
+/// Asks a function of the caller's. It is `dyn`, so that there is one kernel for all callers: what
+/// it asks costs more than the call.
+pub(crate) struct Filter<'a>(pub(crate) &'a mut dyn FnMut(&Candidate) -> bool);
+
+impl Watch for Filter<'_> {
+    const ASKS: bool = true;
+
+    #[inline(always)]
+    fn accepts(&mut self, candidate: &Candidate) -> bool {
+        (self.0)(candidate)
     }
 }
 
@@ -250,17 +301,17 @@ impl<L> BoxLanes<L> {
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
 #[inline(always)]
-fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, C: Count>(
+fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, O: Watch>(
     tree: &Tree<N, W, B>,
     boxes: &BoxLanes<L>,
     mut reference: ChildRef,
     t_max: f32,
     order: impl Fn(&Node<N, W>) -> u64,
     stack: &mut Stack<N>,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<ChildRef> {
     while !reference.is_leaf() {
-        count.node();
+        watch.node();
         let node = &tree.nodes[reference.0 as usize];
         let (enter, mask) = boxes.test(node, t_max);
         reference = if mask & mask.wrapping_sub(1) != 0 {
@@ -284,11 +335,11 @@ pub(crate) fn closest<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    C: Count,
+    O: Watch,
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> Option<Candidate> {
     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
@@ -299,8 +350,8 @@ pub(crate) fn closest<
         ChildRef::inner(0).0,
         ray.t_min,
     );
-    follow::<false, N, W, B, A, L, T, C>(
-        tree, ray, &boxes, &prepared, &mut stack, &mut best, count,
+    follow::<false, N, W, B, A, L, T, O>(
+        tree, ray, &boxes, &prepared, &mut stack, &mut best, watch,
     );
     best.candidate()
 }
@@ -328,7 +379,7 @@ pub(super) fn follow<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    C: Count,
+    O: Watch,
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
@@ -336,7 +387,7 @@ pub(super) fn follow<
     prepared: &A::Ray<T>,
     stack: &mut Stack<N>,
     best: &mut Best,
-    count: &mut C,
+    watch: &mut O,
 ) {
     while let Some((reference, distance)) = stack.pop() {
         if distance > best.t {
@@ -350,16 +401,16 @@ pub(super) fn follow<
             best.t,
             order,
             stack,
-            count,
+            watch,
         ) else {
             continue;
         };
         for block in &tree.blocks[leaf.blocks()] {
-            count.block();
+            watch.block();
             let hits = A::test(ray, prepared, block, &tree.points, best.t);
             if hits.mask != 0 {
-                best.keep_first(&hits, block.ids());
-                if ANY {
+                best.keep_first_accepted(&hits, block.ids(), watch);
+                if ANY && best.is_hit() {
                     return;
                 }
             }
@@ -404,17 +455,34 @@ impl Best {
 
     #[inline(always)]
     pub(super) fn candidate(&self) -> Option<Candidate> {
-        self.is_hit().then(|| Candidate {
+        self.is_hit().then(|| self.weighed())
+    }
+
+    /// With weights divided.
+    #[inline(always)]
+    fn weighed(&self) -> Candidate {
+        Candidate {
             u: self.u / self.den,
             v: self.v / self.den,
             t: self.t,
             id: self.id,
-        })
+        }
     }
 
     /// Takes over the lanes that precede it.
     #[inline(always)]
     pub(super) fn keep_first<T: Lanes<4>>(&mut self, hits: &BlockHits<T>, ids: &[u32; 4]) {
+        self.keep_first_accepted(hits, ids, &mut ());
+    }
+
+    /// Takes over the lanes that precede it and are accepted.
+    #[inline(always)]
+    fn keep_first_accepted<T: Lanes<4>, O: Watch>(
+        &mut self,
+        hits: &BlockHits<T>,
+        ids: &[u32; 4],
+        watch: &mut O,
+    ) {
         let (t, u, v, den) = (
             hits.t.store(),
             hits.u.store(),
@@ -426,13 +494,16 @@ impl Best {
             let lane = lanes.trailing_zeros() as usize & 3;
             lanes &= lanes - 1;
             if precedes((t[lane], ids[lane]), (self.t, self.id)) {
-                *self = Self {
+                let first = Self {
                     t: t[lane],
                     u: u[lane],
                     v: v[lane],
                     den: den[lane],
                     id: ids[lane],
                 };
+                if !O::ASKS || watch.accepts(&first.weighed()) {
+                    *self = first;
+                }
             }
         }
     }
@@ -454,11 +525,11 @@ pub(crate) fn any<
     A: TriangleTest<B>,
     L: PushChildren<N>,
     T: Lanes<4>,
-    C: Count,
+    O: Watch,
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    count: &mut C,
+    watch: &mut O,
 ) -> bool {
     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
@@ -477,13 +548,22 @@ pub(crate) fn any<
             ray.t_max,
             order,
             &mut stack,
-            count,
+            watch,
         ) else {
             continue;
         };
         for block in &tree.blocks[leaf.blocks()] {
-            count.block();
-            if A::test(ray, &prepared, block, &tree.points, ray.t_max).mask != 0 {
+            watch.block();
+            let hits = A::test(ray, &prepared, block, &tree.points, ray.t_max);
+            if hits.mask == 0 {
+                continue;
+            }
+            if !O::ASKS {
+                return true;
+            }
+            let mut first = Best::none(f32::INFINITY);
+            first.keep_first_accepted(&hits, block.ids(), watch);
+            if first.candidate().is_some() {
                 return true;
             }
         }
@@ -542,6 +622,82 @@ pub(crate) fn all<
                 let lane = lanes.trailing_zeros() as usize & 3;
                 lanes &= lanes - 1;
                 visit(Candidate {
+                    t: t[lane],
+                    u: u[lane] / den[lane],
+                    v: v[lane] / den[lane],
+                    id: block.ids()[lane],
+                });
+            }
+        }
+    }
+}
+
+/// Visits the primitives that a ray meets, about from the nearest to the farthest. `meet` tells up
+/// to which distance others are still of interest; those behind it are passed by.
+///
+/// `meet` is `dyn`: what it does, the way through another tree, costs far more than the call.
+#[inline(always)]
+pub(crate) fn visit<
+    const N: usize,
+    const W: usize,
+    B: Block,
+    A: TriangleTest<B>,
+    L: PushChildren<N>,
+    T: Lanes<4>,
+>(
+    tree: &Tree<N, W, B>,
+    ray: &RaySetup,
+    meet: &mut dyn FnMut(&Candidate) -> f32,
+) {
+    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let prepared = A::prepare::<T>(ray);
+    let mut t_max = ray.t_max;
+    let mut stack = Stack::<N>::new();
+    stack.push_if(
+        u32::from(!tree.nodes.is_empty()),
+        ChildRef::inner(0).0,
+        ray.t_min,
+    );
+    while let Some((reference, distance)) = stack.pop() {
+        if distance > t_max {
+            continue;
+        }
+        let order = |node: &Node<N, W>| node.order(ray.octant);
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            t_max,
+            order,
+            &mut stack,
+            &mut (),
+        ) else {
+            continue;
+        };
+        for block in &tree.blocks[leaf.blocks()] {
+            let hits = A::test(ray, &prepared, block, &tree.points, t_max);
+            let mut lanes = hits.mask;
+            if lanes == 0 {
+                continue;
+            }
+            let (t, u, v, den) = (
+                hits.t.store(),
+                hits.u.store(),
+                hits.v.store(),
+                hits.den.store(),
+            );
+            while lanes != 0 {
+                let mut lane = lanes.trailing_zeros() as usize & 3;
+                for other in lane + 1..4 {
+                    if lanes >> other & 1 != 0 && t[other] < t[lane] {
+                        lane = other;
+                    }
+                }
+                lanes &= !(1 << lane);
+                if t[lane] > t_max {
+                    break;
+                }
+                t_max = meet(&Candidate {
                     t: t[lane],
                     u: u[lane] / den[lane],
                     v: v[lane] / den[lane],

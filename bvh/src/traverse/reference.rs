@@ -12,7 +12,8 @@ use crate::{
     Aabb, Accuracy,
     boxes::{self, BoxHit},
     bvh::{bounds_of, hit_of, number_triangles, scale_of, triangle_count},
-    error::BuildError,
+    error::{BuildError, InstanceError},
+    instances::{self, Instance, InstanceHit, Meeting},
     mesh::TriangleMesh,
     ray::{Hit, Ray},
 };
@@ -25,6 +26,20 @@ pub fn closest_hit(
     meshes: &[&TriangleMesh],
     ray: &Ray,
     accuracy: Accuracy,
+) -> Result<Option<Hit>, BuildError> {
+    closest_hit_where(meshes, ray, accuracy, |_| true)
+}
+
+/// The closest of the hits that `accept` takes, as
+/// [`Bvh::closest_hit_where`](crate::Bvh::closest_hit_where) gives it, by asking about every hit.
+///
+/// # Errors
+/// As [`Bvh::build`](crate::Bvh::build), for the same meshes.
+pub fn closest_hit_where(
+    meshes: &[&TriangleMesh],
+    ray: &Ray,
+    accuracy: Accuracy,
+    mut accept: impl FnMut(&Hit) -> bool,
 ) -> Result<Option<Hit>, BuildError> {
     let triangle = match accuracy {
         Accuracy::Fast => fast_triangle,
@@ -50,7 +65,9 @@ pub fn closest_hit(
                 v,
                 id: first_id + primitive_id,
             };
-            if best.is_none_or(|best| precedes((candidate.t, candidate.id), (best.t, best.id))) {
+            if accept(&hit_of(&candidate, &setup, &first_ids))
+                && best.is_none_or(|best| precedes((candidate.t, candidate.id), (best.t, best.id)))
+            {
                 best = Some(candidate);
             }
         }
@@ -68,6 +85,70 @@ pub fn box_intervals(boxes: &[Aabb], ray: &Ray) -> Result<Vec<BoxHit>, BuildErro
     let Some(ray) = RaySetup::new(ray, scale) else {
         return Ok(vec![]);
     };
+    let mut hits: Vec<_> = box_candidates(boxes, &ray, scale)
+        .iter()
+        .map(|candidate| BoxHit::new(candidate, &ray))
+        .collect();
+    hits.sort_by(BoxHit::order);
+    Ok(hits)
+}
+
+/// The closest of the hits with instances that `accept` takes, as
+/// [`InstancedBvh::closest_hit_where`](crate::InstancedBvh::closest_hit_where) gives it, by testing
+/// every triangle of every instance. `objects` are what the trees were built over, each with the
+/// accuracy of its tree.
+///
+/// # Errors
+/// As [`Bvh::build`](crate::Bvh::build) and
+/// [`InstancedBvh::build`](crate::InstancedBvh::build), for the same meshes and instances.
+pub fn closest_instance_hit_where(
+    objects: &[(&[&TriangleMesh], Accuracy)],
+    instances: &[Instance],
+    ray: &Ray,
+    mask: u32,
+    mut accept: impl FnMut(&InstanceHit) -> bool,
+) -> Result<Option<InstanceHit>, InstanceError> {
+    let bounds: Vec<_> = objects
+        .iter()
+        .map(|(meshes, _)| bounds_of(meshes))
+        .collect();
+    let placements = instances::place(&bounds, instances)?;
+    let boxes: Vec<_> = placements
+        .iter()
+        .map(|placement| placement.bounds)
+        .collect();
+    let scale = scale_of(&boxes::check(&boxes)?)?;
+    let Some(world) = RaySetup::new(ray, scale) else {
+        return Ok(None);
+    };
+    let mut best: Option<(f32, InstanceHit)> = None;
+    for interval in box_candidates(&boxes, &world, scale) {
+        let placement = &placements[interval.id as usize];
+        let instance = &instances[placement.instance_id as usize];
+        if instance.mask & mask == 0 {
+            continue;
+        }
+        let meeting = Meeting {
+            world: &world,
+            interval: &interval,
+            instance_id: placement.instance_id,
+        };
+        let (meshes, accuracy) = objects[instance.tree];
+        let ray = placement.to_object.ray(ray);
+        let hit = closest_hit_where(meshes, &ray, accuracy, |hit| accept(&meeting.place(*hit).1))?;
+        if let Some((t, hit)) = hit.map(|hit| meeting.place(hit))
+            && best.is_none_or(|(best_t, best)| {
+                precedes((t, hit.instance_id), (best_t, best.instance_id))
+            })
+        {
+            best = Some((t, hit));
+        }
+    }
+    Ok(best.map(|(_, hit)| hit))
+}
+
+/// Entry and exit of each box that a ray enters, in the order of the boxes.
+fn box_candidates(boxes: &[Aabb], ray: &RaySetup, scale: f32) -> Vec<Candidate> {
     let mut hits = Vec::new();
     for (id, bounds) in (0..).zip(boxes) {
         let (mut t, mut u) = (ray.t_min, ray.t_max);
@@ -79,11 +160,10 @@ pub fn box_intervals(boxes: &[Aabb], ray: &Ray) -> Result<Vec<BoxHit>, BuildErro
             u = u.min(low.max(high) + pad);
         }
         if t <= u {
-            hits.push(BoxHit::new(&Candidate { t, u, v: 0.0, id }, &ray));
+            hits.push(Candidate { t, u, v: 0.0, id });
         }
     }
-    hits.sort_by(BoxHit::order);
-    Ok(hits)
+    hits
 }
 
 /// Distance and weights of vertices 1 and 2 where the ray meets a triangle.
