@@ -1,5 +1,5 @@
-//! The automatic choice: of our trees and numbers of rays in flight, what is fastest on rays of the
-//! same kind that are not measured afterwards.
+//! The automatic choice: of our trees and ways to ask them, what is fastest on rays of the same kind
+//! that are not measured afterwards.
 
 use raywright_benches::{clock::Clock, rays::RaySet, turns::measure_chunks};
 use raywright_bvh::Ray;

@@ -1,13 +1,21 @@
-//! Our trees, by single rays and with several in flight.
+//! Our trees, by single rays and by batches of them.
 
 use std::fmt;
 
-use raywright_bvh::{Accuracy, BuildParams, Bvh, Isa, LeafFormat, Quality, Ray, TriangleMesh};
+use raywright_bvh::{
+    Accuracy, BuildParams, Bvh, Isa, LeafFormat, Quality, Ray, RayPackets, TriangleMesh,
+};
 
 use super::engine::{Answers, Engine, Role, Trace, stored};
 
-/// How many rays are in flight together where several are.
-const IN_FLIGHT: [usize; 3] = [4, 8, 16];
+/// The ways in which batches are traced.
+const BATCHES: [Calls; 5] = [
+    Calls::Batch(4, RayPackets::Off),
+    Calls::Batch(8, RayPackets::Off),
+    Calls::Batch(16, RayPackets::Off),
+    Calls::Batch(1, RayPackets::On),
+    Calls::Batch(8, RayPackets::On),
+];
 
 /// What a ray is traced through. Where the width is not said, it is that of [`TreeKind::same`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,12 +31,20 @@ pub(crate) enum TreeKind {
     Compact,
 }
 
-/// A tree and how many rays go through it at a time.
+/// How a tree is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Calls {
+    /// A call for each ray.
+    Single,
+    /// A call for many, with so many of them in flight, and neighbours together or not.
+    Batch(u32, RayPackets),
+}
+
+/// A tree and how it is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Ours {
     pub(crate) tree: TreeKind,
-    /// 1 is a call for each ray.
-    pub(crate) in_flight: usize,
+    pub(crate) calls: Calls,
 }
 
 impl TreeKind {
@@ -68,15 +84,18 @@ impl TreeKind {
         }
     }
 
-    /// Whether it is also traced with several rays in flight.
-    fn takes_several(self) -> bool {
+    /// Whether it is also traced by batches.
+    fn takes_batches(self) -> bool {
         matches!(self, Self::Binned(_) | Self::Optimized(_))
     }
 }
 
 impl Ours {
     pub(crate) fn single(tree: TreeKind) -> Self {
-        Self { tree, in_flight: 1 }
+        Self {
+            tree,
+            calls: Calls::Single,
+        }
     }
 
     /// Whether the automatic choice may take it: it gives what Embree's medium gives, by the
@@ -99,9 +118,11 @@ impl fmt::Display for Ours {
             TreeKind::Robust => write!(f, "robust"),
             TreeKind::Compact => write!(f, "compact"),
         }?;
-        match self.in_flight {
-            1 => Ok(()),
-            n => write!(f, ", {n} in flight"),
+        match self.calls {
+            Calls::Single => Ok(()),
+            Calls::Batch(n, RayPackets::Off) => write!(f, ", {n} in flight"),
+            Calls::Batch(1, RayPackets::On) => write!(f, ", packets"),
+            Calls::Batch(n, RayPackets::On) => write!(f, ", packets, {n} in flight"),
         }
     }
 }
@@ -119,7 +140,7 @@ pub(crate) fn engines(mesh: &TriangleMesh) -> Vec<Engine<'static>> {
         Robust,
         Compact,
     ];
-    let (mut single, mut several) = (Vec::new(), Vec::new());
+    let (mut single, mut batches) = (Vec::new(), Vec::new());
     for kind in kinds {
         let tree = match Bvh::build(&[mesh], &kind.params()) {
             Ok(tree) => tree,
@@ -134,24 +155,29 @@ pub(crate) fn engines(mesh: &TriangleMesh) -> Vec<Engine<'static>> {
             continue;
         };
         let bytes = tree.stats().bytes as f64 / mesh.triangles().len() as f64;
-        let engine = |in_flight: usize, tracer: Box<dyn Trace>| Engine {
-            role: Role::Ours(Ours {
-                tree: kind,
-                in_flight,
-            }),
+        let engine = |calls: Calls, tracer: Box<dyn Trace>| Engine {
+            role: Role::Ours(Ours { tree: kind, calls }),
             bytes_per_triangle: Some(bytes),
             tracer,
         };
-        if kind.takes_several() {
-            several.extend(IN_FLIGHT.map(|n| {
-                let tree = tree.clone().with_in_flight(n);
-                engine(n, Box::new(InFlight(tree)))
-            }));
+        if kind.takes_batches() {
+            batches.extend(BATCHES.map(|calls| engine(calls, tracer(tree.clone(), calls))));
         }
-        single.push(engine(1, Box::new(OneByOne(tree))));
+        single.push(engine(Calls::Single, tracer(tree, Calls::Single)));
     }
-    single.append(&mut several);
+    single.append(&mut batches);
     single
+}
+
+/// A tree that is asked so.
+fn tracer(tree: Bvh, calls: Calls) -> Box<dyn Trace> {
+    match calls {
+        Calls::Single => Box::new(OneByOne(tree)),
+        Calls::Batch(in_flight, packets) => {
+            let tree = tree.with_rays_in_flight(in_flight);
+            Box::new(InBatches(tree.with_ray_packets(packets)))
+        }
+    }
 }
 
 struct OneByOne(Bvh);
@@ -166,9 +192,9 @@ impl Trace for OneByOne {
     }
 }
 
-struct InFlight(Bvh);
+struct InBatches(Bvh);
 
-impl Trace for InFlight {
+impl Trace for InBatches {
     fn closest(&self, rays: &[Ray], answers: &mut Answers) {
         self.0.closest_hits(rays, &mut answers.hits);
         answers.closest.clear();

@@ -10,7 +10,7 @@ use raywright_bvh::Ray;
 use super::{
     embree::EmbreeScene,
     engine::{Answers, Engine, Role},
-    ours::Ours,
+    ours::{Calls, Ours},
 };
 
 const ROUNDS: usize = 5;
@@ -70,7 +70,7 @@ impl Measured {
             Clock::ThreadCpu.name()
         );
         println!(
-            "  {:<38}{:>10}{:>8}{:>18}{:>10}",
+            "  {:<42}{:>10}{:>8}{:>18}{:>10}",
             "", "Mrays/s", "speed", "quartiles", "differ"
         );
         for place in 0..self.roles.len() {
@@ -89,7 +89,7 @@ impl Measured {
     fn print_row(&self, name: &str, place: usize) {
         let Ratio { median, quartiles } = self.turns.speed[place];
         println!(
-            "  {name:<38}{:>10.2}{median:>8.3}{:>18}{:>10}",
+            "  {name:<42}{:>10.2}{median:>8.3}{:>18}{:>10}",
             self.rays as f64 / self.turns.times[place].as_secs_f64() / 1e6,
             format!("{:.3} … {:.3}", quartiles[0], quartiles[1]),
             self.different[place]
@@ -156,9 +156,9 @@ fn differ(got: f32, expected: f32) -> bool {
 pub(crate) fn print_bytes(engines: &[Engine<'_>]) {
     println!("bytes per triangle:");
     for engine in engines {
-        let is_single = !matches!(engine.role, Role::Ours(ours) if ours.in_flight > 1);
-        if let Some(bytes) = engine.bytes_per_triangle.filter(|_| is_single) {
-            println!("  {:<38}{bytes:>8.1}", engine.role.to_string());
+        let is_batch = matches!(engine.role, Role::Ours(ours) if ours.calls != Calls::Single);
+        if let Some(bytes) = engine.bytes_per_triangle.filter(|_| !is_batch) {
+            println!("  {:<42}{bytes:>8.1}", engine.role.to_string());
         }
     }
 }

@@ -4,11 +4,12 @@
 use std::thread;
 
 use raywright_benches::{clock::Clock, rays::RaySet, turns::measure_by};
+use raywright_bvh::RayPackets;
 
 use super::{
     embree::EmbreeScene,
     engine::{Answers, Engine, Role},
-    ours::{Ours, TreeKind},
+    ours::{Calls, Ours, TreeKind},
 };
 
 const ROUNDS: usize = 5;
@@ -38,13 +39,13 @@ pub(crate) fn table(set: &RaySet, engines: &[Engine<'_>]) {
         Clock::Wall.name()
     );
     println!(
-        "  {:<38}{:>10}{:>8}{:>18}",
+        "  {:<42}{:>10}{:>8}{:>18}",
         "", "Mrays/s", "speed", "quartiles"
     );
     for (place, engine) in engines.iter().enumerate() {
         let speed = turns.speed[place];
         println!(
-            "  {:<38}{:>10.2}{:>8.3}{:>18}",
+            "  {:<42}{:>10.2}{:>8.3}{:>18}",
             engine.role.to_string(),
             set.rays.len() as f64 / turns.times[place].as_secs_f64() / 1e6,
             speed.median,
@@ -60,7 +61,7 @@ fn is_threaded(role: Role) -> bool {
             let trees = [TreeKind::Binned(16), TreeKind::Optimized(16)];
             let eight = Ours {
                 tree: TreeKind::Optimized(16),
-                in_flight: 8,
+                calls: Calls::Batch(8, RayPackets::Off),
             };
             ours == eight || trees.map(Ours::single).contains(&ours)
         }
