@@ -5,7 +5,7 @@
 
 use raywright_benches::{
     goals::Goals,
-    rays::{RaySet, ray_sets},
+    rays::{RaySet, SIDE, ray_sets},
     turns::measure,
 };
 use raywright_bvh::{BuildParams, Bvh, Isa, Ray, Work};
@@ -31,7 +31,7 @@ fn main() {
             "\n{name}: {} triangles, one thread, {ROUNDS} rounds in turns",
             world.scene().triangle_count()
         );
-        for set in ray_sets(&world, &tree) {
+        for set in ray_sets(&world, &tree, SIDE) {
             table(name, &set, &engines, &tree, &mut goals);
         }
     }

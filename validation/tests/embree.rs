@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use raywright_bvh::{BuildParams, Bvh, Ray, TriangleMesh, Vec3};
+use raywright_bvh::{BuildParams, Bvh, Isa, Ray, TriangleMesh, Vec3};
 use raywright_validation::{
     Tree, TriangleSet,
-    embree::{BuildArguments, BuildQuality, Device, Embree, EmbreeError, SceneSettings},
+    embree::{BuildArguments, BuildQuality, Device, Embree, EmbreeError, EmbreeHit, SceneSettings},
     golden::{self, Outcome},
     random::RandomBuild,
 };
@@ -128,6 +128,39 @@ fn hits_are_ours() {
             }
         }
         assert!(hits > 500, "{hits} hits");
+    }
+}
+
+/// Also of a packet that is not full.
+#[test]
+fn packets_and_narrow_instructions_have_the_hits_of_single_rays() {
+    let Some(device) = device() else { return };
+    let embree = Embree::find().expect("found before");
+    let narrow = embree.device_held_to(1, Isa::Avx2).expect("a device");
+    assert_ne!(narrow.instruction_set(), "AVX-512");
+    let set = set("uniform1000");
+    let vertices: Vec<Vec3> = set.triangles.iter().flatten().copied().collect();
+    let indices = (0..set.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
+    let mesh = TriangleMesh::new(vertices, indices.collect()).expect("a mesh");
+    let settings = SceneSettings::of_quality(BuildQuality::Medium);
+    let rays: Vec<Ray> = rays().take(1997).collect();
+    let (mut hits, mut are_hit) = (Vec::new(), Vec::new());
+    let same = |a: Option<EmbreeHit>, b: Option<EmbreeHit>| match (a, b) {
+        (Some(a), Some(b)) => (a.t - b.t).abs() <= 1e-5 * a.t,
+        (a, b) => a == b,
+    };
+    let scene = device.scene(&[&mesh], &settings).expect("a scene");
+    let scene = scene.commit().expect("committed");
+    let expected: Vec<_> = rays.iter().map(|ray| scene.closest_hit(ray)).collect();
+    scene.closest_hits(&rays, &mut hits);
+    scene.any_hits(&rays, &mut are_hit);
+    assert_eq!((hits.len(), are_hit.len()), (rays.len(), rays.len()));
+    let narrow = narrow.scene(&[&mesh], &settings).expect("a scene");
+    let narrow = narrow.commit().expect("committed");
+    for (i, ray) in rays.iter().enumerate() {
+        assert!(same(expected[i], hits[i]), "{ray:?}");
+        assert!(same(expected[i], narrow.closest_hit(ray)), "{ray:?}");
+        assert_eq!(are_hit[i], expected[i].is_some(), "{ray:?}");
     }
 }
 

@@ -1,23 +1,21 @@
-//! Do our trees cost less to build than Embree's of the same kind, and are they faster to trace?
+//! Do our trees cost less to build than Embree's of the same kind? Rays: `--bench trace`.
 //!
 //! Run: `cargo bench -p raywright-benches --bench build [--features peers] [-- SCENE…]`
 //!
 //! Scenes are sponza, conference, bmw_m6 and dragon of the shared data, or the built-in ones. Per
 //! scene, our builds beside `rtcCommitScene` of the same quality (low: of the mesh too, which is
-//! Morton order), `Hierarchy::build` beside `rtcBuildBVH`, and with `peers` other crates; then rays
-//! through both. Embree is found as `raywright_validation::embree` says; without it, nothing is
-//! compared and no goal is judged.
+//! Morton order), `Hierarchy::build` beside `rtcBuildBVH`, and with `peers` other crates. Embree is
+//! found as `raywright_validation::embree` says; without it, nothing is compared and no goal is
+//! judged.
 //!
 //! Method: rounds in turns, the first dropped, median and quartiles of the ratio within a round;
 //! what is timed follows an untimed run of its own kind. A row "again" shows the noise.
-//! One thread: CPU time of the process for builds, of the thread for rays. Two threads: wall time,
-//! builds only, no goals. Embree's number of threads acts on a whole process, so each number has a
+//! One thread: CPU time of the process. Two threads: wall time, no goals. Embree's number of threads acts on a whole process, so each number has a
 //! process of its own.
 
 mod builds;
 #[cfg(feature = "peers")]
 mod peers;
-mod trace;
 
 use std::{env, process};
 
@@ -81,7 +79,6 @@ fn part(threads: usize, names: &[&str]) {
     };
     let names = if names.is_empty() { &SCENES } else { names };
     let mut builds = builds::Summary::default();
-    let mut trace = trace::Summary::default();
     for scene in real_or_built_in(names) {
         println!(
             "\n{}: {} triangles",
@@ -89,14 +86,10 @@ fn part(threads: usize, names: &[&str]) {
             scene.mesh.triangles().len()
         );
         builds.measure(&scene, device.as_ref(), threads);
-        if threads == 1 {
-            trace.measure(&scene, device.as_ref());
-        }
     }
     if threads == 1 && device.is_some() {
         let mut goals = Goals::default();
         builds.judge(&mut goals);
-        trace.judge(&mut goals);
         goals.print();
     }
 }

@@ -1,6 +1,6 @@
 //! The foreign interface: the only `unsafe` of this crate.
 //!
-//! Source: Embree's `rtcore*.h`, versions 3.13 and 4.4 (Apache-2.0); about 25 functions and 6
+//! Source: Embree's `rtcore*.h`, versions 3.13 and 4.4 (Apache-2.0); about 27 functions and 9
 //! structs are declared by hand. What differs between the versions is in [`Scene`].
 //!
 //! Invariants, on which every SAFETY note rests:
@@ -11,6 +11,7 @@
 
 mod api;
 mod build;
+mod packet;
 mod scene;
 
 use std::{
@@ -20,6 +21,8 @@ use std::{
     ptr,
     sync::atomic::{AtomicIsize, Ordering},
 };
+
+use raywright_bvh::Isa;
 
 use super::{EmbreeError, find};
 
@@ -78,8 +81,27 @@ impl Embree {
     /// # Errors
     /// If the library refuses or is neither version 3 nor 4.
     pub fn device(&self, threads: usize) -> Result<Device, EmbreeError> {
-        let config = format!("threads={threads}\0");
-        // SAFETY: the text ends in a zero byte and outlives the call, which copies it.
+        self.configured_device(format!("threads={threads}\0"))
+    }
+
+    /// The same with no wider instructions than `widest`, even where the machine has them.
+    ///
+    /// # Errors
+    /// As [`Embree::device`].
+    pub fn device_held_to(&self, threads: usize, widest: Isa) -> Result<Device, EmbreeError> {
+        // The option `isa` would also take what the machine does not have.
+        let name = match widest {
+            Isa::Avx2 => "avx2",
+            Isa::Avx512 => "avx512",
+            _ => "sse2",
+        };
+        self.configured_device(format!("threads={threads},max_isa={name}\0"))
+    }
+
+    /// A device by the library's own words, which end in a zero byte.
+    fn configured_device(&self, config: String) -> Result<Device, EmbreeError> {
+        // SAFETY: the text ends in a zero byte (both callers write it) and outlives the call, which
+        // copies it.
         let handle = unsafe { (self.api.new_device)(config.as_ptr().cast()) };
         if handle.is_null() {
             // SAFETY: a null device is allowed: the error is then that of this thread.

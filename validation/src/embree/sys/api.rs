@@ -3,6 +3,7 @@
 use std::{
     ffi::{c_char, c_void},
     path::Path,
+    ptr,
 };
 
 use libloading::{Error, Library};
@@ -71,6 +72,41 @@ pub(super) struct RayHit {
     pub(super) instance_ids: [u32; 13],
 }
 
+/// Rays of a packet.
+pub(super) const PACKET: usize = 8;
+
+/// `RTCRay8`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct RayRecord8 {
+    pub(super) origin: [[f32; PACKET]; 3],
+    pub(super) t_near: [f32; PACKET],
+    pub(super) direction: [[f32; PACKET]; 3],
+    pub(super) time: [f32; PACKET],
+    pub(super) t_far: [f32; PACKET],
+    pub(super) mask: [u32; PACKET],
+    pub(super) id: [u32; PACKET],
+    pub(super) flags: [u32; PACKET],
+}
+
+/// `RTCRayHit8`, with room for what later versions add to the hit.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct RayHit8 {
+    pub(super) ray: RayRecord8,
+    pub(super) normal: [[f32; PACKET]; 3],
+    pub(super) u: [f32; PACKET],
+    pub(super) v: [f32; PACKET],
+    pub(super) primitive_id: [u32; PACKET],
+    pub(super) geometry_id: [u32; PACKET],
+    pub(super) instance_ids: [[u32; PACKET]; 4],
+}
+
+/// Which rays of a packet are there: −1, or 0 for those that are not.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Valid8(pub(super) [i32; PACKET]);
+
 /// `RTCIntersectContext` of version 3, with room to spare.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
@@ -80,6 +116,20 @@ pub(super) struct Context3 {
     pub(super) filter: *const c_void,
     pub(super) instance_id: u32,
     pub(super) rest: [u32; 27],
+}
+
+impl Context3 {
+    /// The context of rays without filter and instance.
+    #[inline]
+    pub(super) fn new() -> Self {
+        Self {
+            flags: 0,
+            padding: 0,
+            filter: ptr::null(),
+            instance_id: NO_ID,
+            rest: [0; 27],
+        }
+    }
 }
 
 pub(super) type CreateNode = extern "C" fn(Allocator, u32, *mut c_void) -> *mut c_void;
@@ -174,6 +224,10 @@ functions! {
     intersect1 = "rtcIntersect1": fn(SceneHandle, *mut c_void, *mut c_void);
     /// Version 4: scene, ray, arguments. Version 3: scene, context, ray.
     occluded1 = "rtcOccluded1": fn(SceneHandle, *mut c_void, *mut c_void);
+    /// As `intersect1`, behind which rays are there.
+    intersect8 = "rtcIntersect8": fn(*const Valid8, SceneHandle, *mut c_void, *mut c_void);
+    /// As `occluded1`, behind which rays are there.
+    occluded8 = "rtcOccluded8": fn(*const Valid8, SceneHandle, *mut c_void, *mut c_void);
 }
 
 #[cfg(test)]
@@ -192,6 +246,14 @@ mod tests {
         assert_eq!(offset_of!(RayHit, u), 60);
         assert_eq!(offset_of!(RayHit, geometry_id), 72);
         assert_eq!(size_of::<RayHit>(), 128);
+        assert_eq!(
+            (size_of::<RayRecord8>(), align_of::<RayRecord8>()),
+            (384, 32)
+        );
+        assert_eq!(offset_of!(RayRecord8, t_far), 256);
+        assert_eq!(offset_of!(RayHit8, u), 480);
+        assert_eq!(offset_of!(RayHit8, geometry_id), 576);
+        assert_eq!((size_of::<Valid8>(), align_of::<Valid8>()), (32, 32));
         assert_eq!(offset_of!(Context3, filter), 8);
         assert_eq!(offset_of!(Context3, instance_id), 16);
         assert_eq!(offset_of!(Arguments, intersection_cost), 40);
@@ -235,6 +297,14 @@ mod tests {
         // Room for more at the end is on purpose.
         assert!(size_of::<RayHit>() >= size_of::<header::RTCRayHit>());
         same_places!(RayHit, header::RTCRayHit:
+            ray = ray, normal = hit.Ng_x, u = hit.u, v = hit.v, primitive_id = hit.primID, geometry_id = hit.geomID,
+            instance_ids = hit.instID);
+        same_shape::<RayRecord8, header::RTCRay8>();
+        same_places!(RayRecord8, header::RTCRay8:
+            origin = org_x, t_near = tnear, direction = dir_x, time = time, t_far = tfar, mask = mask, id = id,
+            flags = flags);
+        assert!(size_of::<RayHit8>() >= size_of::<header::RTCRayHit8>());
+        same_places!(RayHit8, header::RTCRayHit8:
             ray = ray, normal = hit.Ng_x, u = hit.u, v = hit.v, primitive_id = hit.primID, geometry_id = hit.geomID,
             instance_ids = hit.instID);
         same_shape::<Arguments, header::RTCBuildArguments>();

@@ -1,4 +1,4 @@
-//! Scenes of triangle meshes, and rays.
+//! Scenes of triangle meshes, and rays one at a time.
 
 use std::{ffi::c_void, ptr};
 
@@ -20,16 +20,21 @@ pub struct PreparedScene<'a>(Handle<'a>);
 /// A scene that can be asked with rays.
 #[derive(Debug)]
 pub struct Scene<'a> {
-    handle: Handle<'a>,
+    pub(super) handle: Handle<'a>,
     /// Version 3 has the context before the ray, version 4 the arguments behind it.
-    context_first: bool,
+    pub(super) context_first: bool,
 }
+
+// SAFETY: what a shared scene allows is to ask it with rays, which the library's manual allows to
+// many threads at once on a scene that is committed; nothing of it asks the device for errors,
+// which are kept per thread.
+unsafe impl Sync for Scene<'_> {}
 
 /// A scene's handle, released at the end.
 #[derive(Debug)]
-struct Handle<'a> {
-    device: &'a Device,
-    scene: SceneHandle,
+pub(super) struct Handle<'a> {
+    pub(super) device: &'a Device,
+    pub(super) scene: SceneHandle,
 }
 
 impl Device {
@@ -163,13 +168,7 @@ impl Scene<'_> {
     ) {
         let scene = self.handle.scene;
         if self.context_first {
-            let mut context = Context3 {
-                flags: 0,
-                padding: 0,
-                filter: ptr::null(),
-                instance_id: NO_ID,
-                rest: [0; 27],
-            };
+            let mut context = Context3::new();
             // SAFETY: the scene is committed and alive; both records have the header's layout or
             // more room (3), and the alignment of 16 that the library asks for.
             unsafe { function(scene, ptr::from_mut(&mut context).cast(), record) }
