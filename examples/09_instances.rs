@@ -27,7 +27,7 @@ fn is_opaque(hit: &InstanceHit) -> bool {
     let (x, y) = [(u + v, v), (u, u + v)][hit.hit.primitive_id as usize];
     let radius = (2.0 * x - 1.0).hypot(2.0 * y - 1.0);
     // The stem has no holes.
-    hit.hit.geometry_id == 0 || (radius < 1.0 && (radius * 10.0) as u32 % 3 != 0)
+    hit.hit.geometry_id == 0 || (radius < 1.0 && !((radius * 10.0) as u32).is_multiple_of(3))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -241,7 +241,9 @@ pub const PARAMETERS: [Parameter; 16] = [
     Parameter {
         name: "rays_in_flight",
         range: ParameterRange::Integers(1, MAX_IN_FLIGHT as u32),
-        tuned: ParameterRange::OneOf(&[1, 4, 8, 16]),
+        // More made every picture slower that was measured: they pay for bounces and segments in some scenes, see the
+        // benchmark `trace`, and lose more on the other rays of a path.
+        tuned: ParameterRange::OneOf(&[1]),
         changes_hits: false,
         meaning: "rays of a batch that a core traces in turns",
     },

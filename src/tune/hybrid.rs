@@ -119,7 +119,7 @@ pub struct Hybrid<'a, C> {
 /// What is done for a trial in a frame.
 enum Step {
     /// It is tried: with a tree that is ready, or one that is to be built.
-    Try(Trial, Option<Built>),
+    Try(Trial, Option<Box<Built>>),
     /// Its tree is begun beside the frame.
     Begin(Trial, BuildParams),
 }
@@ -263,7 +263,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
                     start += self.time_of(|| begins(&trial));
                     (Some(trial), None)
                 }
-                Some(Step::Try(trial, ready)) => (Some(trial), ready),
+                Some(Step::Try(trial, ready)) => (Some(trial), ready.map(|built| *built)),
                 Some(Step::Begin(trial, params)) => {
                     start += self.time_of(|| begins(&trial));
                     self.begin_beside(trial, params);
@@ -447,7 +447,7 @@ impl<'a, C: Clock> Hybrid<'a, C> {
         }
         if let Some(background) = self.background.as_mut().filter(|own| own.is_building()) {
             let finished = background.finished();
-            return Ok(finished.map(|(trial, built)| Step::Try(trial, Some(built))));
+            return Ok(finished.map(|(trial, built)| Step::Try(trial, Some(Box::new(built)))));
         }
         let trial = match self.waiting.take() {
             Some(trial) => trial,

@@ -190,7 +190,7 @@ fn param_of(parameter: &Parameter) -> Option<Param> {
         ParameterRange::Integers(min, max) => {
             Param::integer(name, i64::from(min)..=i64::from(max), Scale::Linear, doc)
         }
-        ParameterRange::OneOf(values) => {
+        ParameterRange::OneOf(values) if values.len() > 1 => {
             Param::ordinal(name, values.iter().map(|&v| i64::from(v)).collect(), doc)
         }
         ParameterRange::Reals(min, max) => {
@@ -199,7 +199,7 @@ fn param_of(parameter: &Parameter) -> Option<Param> {
         ParameterRange::Words(words) if words.len() > 1 => {
             Param::ordinal(name, (0..words.len() as i64).collect(), doc)
         }
-        ParameterRange::Words(..) => return None,
+        ParameterRange::OneOf(_) | ParameterRange::Words(_) => return None,
     })
 }
 
