@@ -253,12 +253,6 @@ impl Bvh {
         self
     }
 
-    /// Whether rays are to be traced in batches: they are traced in turns or as packets there.
-    #[must_use]
-    pub fn prefers_batches(&self) -> bool {
-        self.params.rays_in_flight > 1 || self.params.ray_packets == RayPackets::On
-    }
-
     /// The same tree, traced by the kernels of another instruction set. `None` if this machine
     /// does not have it.
     #[must_use]

@@ -50,25 +50,6 @@ impl Tile {
             .flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 
-    /// The same, square by square of `side` ≥ 1 pixels, so that neighbours in the order are near each other in both
-    /// directions; squares at the right and bottom border may be smaller.
-    pub fn pixels_by_squares(&self, side: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
-        let side = side.max(1);
-        let parts = move |whole: Range<u32>| {
-            let end = whole.end;
-            whole
-                .step_by(side as usize)
-                .map(move |start| start..end.min(start + side))
-        };
-        let columns = self.columns();
-        parts(self.rows()).flat_map(move |rows| {
-            parts(columns.clone()).flat_map(move |columns| {
-                rows.clone()
-                    .flat_map(move |y| columns.clone().map(move |x| (x, y)))
-            })
-        })
-    }
-
     /// The columns of the tile.
     pub fn columns(&self) -> Range<u32> {
         self.x..self.x + self.width

@@ -263,21 +263,3 @@ fn work_that_returns_early_is_not_complete() {
     assert_eq!(film.samples(), 2 * 8 + 4);
     assert_eq!((film.pixel(3, 2).count(), film.pixel(4, 2).count()), (1, 0));
 }
-
-#[test]
-fn squares_hold_each_pixel_once_and_neighbours_together() {
-    let tile = Tile {
-        index: 0,
-        x: 64,
-        y: 32,
-        width: 33,
-        height: 21,
-    };
-    for side in [1, 4, 7, 40] {
-        let mut pixels: Vec<_> = tile.pixels_by_squares(side).collect();
-        let square = |&(x, y): &(u32, u32)| ((y - tile.y) / side, (x - tile.x) / side);
-        assert!(pixels.is_sorted_by_key(square), "side {side}");
-        pixels.sort_unstable_by_key(|&(x, y)| (y, x));
-        assert!(pixels.into_iter().eq(tile.pixels()), "side {side}");
-    }
-}

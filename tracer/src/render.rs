@@ -15,7 +15,7 @@ use raywright_imaging::{
 };
 
 use crate::{
-    integrator::{self, Integrator, path::Path, wave},
+    integrator::{self, Integrator},
     world::World,
 };
 
@@ -61,33 +61,13 @@ impl Shot<'_> {
         samples: Range<u32>,
         tree: &Bvh,
     ) {
-        let ray_of = |(x, y), sample| {
-            let sampler = PixelSampler::new(self.seed, x, y, sample);
-            let [dx, dy] = sampler.uniform_2d(dimension::FILM);
-            let direction = projection.direction(x as f32 + dx, y as f32 + dy);
-            (Ray::new(projection.origin(), direction), sampler)
-        };
-        if let Integrator::Path { path_length } = self.integrator
-            && tree.prefers_batches()
-        {
-            let mut paths = Vec::new();
-            for sample in samples {
-                paths.clear();
-                paths.extend(tile.pixels_by_squares(wave::SQUARE).map(|pixel| {
-                    let (ray, sampler) = ray_of(pixel, sample);
-                    (Path::new(ray), sampler)
-                }));
-                wave::follow(self.world, tree, &mut paths, path_length);
-                for ((x, y), (path, _)) in tile.pixels_by_squares(wave::SQUARE).zip(&paths) {
-                    view.pixel_mut(x, y).add(path.radiance);
-                }
-            }
-            return;
-        }
         for (x, y) in tile.pixels() {
             let pixel = view.pixel_mut(x, y);
             for sample in samples.clone() {
-                let (ray, sampler) = ray_of((x, y), sample);
+                let sampler = PixelSampler::new(self.seed, x, y, sample);
+                let [dx, dy] = sampler.uniform_2d(dimension::FILM);
+                let direction = projection.direction(x as f32 + dx, y as f32 + dy);
+                let ray = Ray::new(projection.origin(), direction);
                 pixel.add(match self.integrator {
                     Integrator::Path { path_length } => {
                         integrator::path::radiance(self.world, tree, ray, &sampler, path_length)

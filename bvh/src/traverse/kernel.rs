@@ -57,7 +57,7 @@ impl RaySetup {
     /// Prepares a ray for a tree whose coordinates are those of the caller times `scale`, a power
     /// of two. `None` if the ray can hit nothing: not finite, without direction, an empty
     /// interval, or an origin so far away that it has no precision left.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(ray: &Ray, scale: f32) -> Option<Self> {
         let origin = ray.origin * scale;
         let largest = ray.direction.abs().max_element();
@@ -350,9 +350,31 @@ pub(crate) fn closest<
         ChildRef::inner(0).0,
         ray.t_min,
     );
-    follow::<false, N, W, B, A, L, T, O>(
-        tree, ray, &boxes, &prepared, &mut stack, &mut best, watch,
-    );
+    // The loop of `follow` with all that changes in places of its own.
+    while let Some((reference, distance)) = stack.pop() {
+        if distance > best.t {
+            continue;
+        }
+        let order = |node: &Node<N, W>| node.order(ray.octant);
+        let Some(leaf) = descend(
+            tree,
+            &boxes,
+            ChildRef(reference),
+            best.t,
+            order,
+            &mut stack,
+            watch,
+        ) else {
+            continue;
+        };
+        for block in &tree.blocks[leaf.blocks()] {
+            watch.block();
+            let hits = A::test(ray, &prepared, block, &tree.points, best.t);
+            if hits.mask != 0 {
+                best.keep_first_accepted(&hits, block.ids(), watch);
+            }
+        }
+    }
     best.candidate()
 }
 

@@ -4,7 +4,6 @@
 pub(crate) mod naive;
 pub(crate) mod path;
 pub(crate) mod view;
-pub(crate) mod wave;
 
 pub use view::View;
 
