@@ -18,7 +18,7 @@ use crate::{
     stats::{TreeStats, sah_cost},
     traverse::{
         fast::Fast,
-        kernel::{Candidate, RaySetup, Watch},
+        kernel::{Asked, Candidate, RaySetup, Watch},
         robust::Robust,
         stream::{Together, Waiting},
     },
@@ -89,17 +89,18 @@ impl AnyTree {
     }
 
     #[inline]
-    pub(crate) fn closest<O: Watch>(
+    pub(crate) fn closest<O: Watch, H>(
         &self,
         isa: Isa,
-        ray: &RaySetup,
+        ray: impl Asked,
         watch: &mut O,
-    ) -> Option<Candidate> {
-        for_width!(self, tree => tree.closest(isa, ray, watch))
+        tell: impl FnOnce(&Candidate, &RaySetup) -> H,
+    ) -> Option<H> {
+        for_width!(self, tree => tree.closest(isa, ray, watch, tell))
     }
 
     #[inline]
-    pub(crate) fn any<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> bool {
+    pub(crate) fn any<O: Watch>(&self, isa: Isa, ray: impl Asked, watch: &mut O) -> bool {
         for_width!(self, tree => tree.any(isa, ray, watch))
     }
 
@@ -166,18 +167,26 @@ where
     }
 
     #[inline]
-    fn closest<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> Option<Candidate> {
+    fn closest<O: Watch, H>(
+        &self,
+        isa: Isa,
+        ray: impl Asked,
+        watch: &mut O,
+        tell: impl FnOnce(&Candidate, &RaySetup) -> H,
+    ) -> Option<H> {
         use dispatch::closest;
         match self {
-            Self::Fast(tree) => closest::<N, W, _, Fast, O>(isa, tree, ray, watch),
-            Self::Robust(tree) => closest::<N, W, _, Robust, O>(isa, tree, ray, watch),
-            Self::CompactFast(tree) => closest::<N, W, _, Fast, O>(isa, tree, ray, watch),
-            Self::CompactRobust(tree) => closest::<N, W, _, Robust, O>(isa, tree, ray, watch),
+            Self::Fast(tree) => closest::<N, W, _, Fast, O, H>(isa, tree, ray, watch, tell),
+            Self::Robust(tree) => closest::<N, W, _, Robust, O, H>(isa, tree, ray, watch, tell),
+            Self::CompactFast(tree) => closest::<N, W, _, Fast, O, H>(isa, tree, ray, watch, tell),
+            Self::CompactRobust(tree) => {
+                closest::<N, W, _, Robust, O, H>(isa, tree, ray, watch, tell)
+            }
         }
     }
 
     #[inline]
-    fn any<O: Watch>(&self, isa: Isa, ray: &RaySetup, watch: &mut O) -> bool {
+    fn any<O: Watch>(&self, isa: Isa, ray: impl Asked, watch: &mut O) -> bool {
         use dispatch::any;
         match self {
             Self::Fast(tree) => any::<N, W, _, Fast, O>(isa, tree, ray, watch),

@@ -26,7 +26,7 @@ use crate::{
     stats::TreeStats,
     traverse::{
         box_test::BoxTest,
-        kernel::{Candidate, RaySetup},
+        kernel::{Candidate, RaySetup, Unprepared},
     },
 };
 
@@ -79,11 +79,12 @@ impl BoxTree {
         })
     }
 
-    fn closest(&self, isa: Isa, ray: &RaySetup) -> Option<Candidate> {
-        for_width!(self, tree => dispatch::closest::<_, _, _, BoxTest, _>(isa, tree, ray, &mut ()))
+    fn closest(&self, isa: Isa, ray: Unprepared<'_>) -> Option<BoxHit> {
+        for_width!(self, tree =>
+            dispatch::closest::<_, _, _, BoxTest, _, _>(isa, tree, ray, &mut (), BoxHit::new))
     }
 
-    fn any(&self, isa: Isa, ray: &RaySetup) -> bool {
+    fn any(&self, isa: Isa, ray: Unprepared<'_>) -> bool {
         for_width!(self, tree => dispatch::any::<_, _, _, BoxTest, _>(isa, tree, ray, &mut ()))
     }
 
@@ -163,15 +164,13 @@ impl BoxBvh {
     /// an empty interval enters none.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray) -> Option<BoxHit> {
-        let setup = RaySetup::new(ray, self.scale)?;
-        let candidate = self.tree.closest(self.isa, &setup)?;
-        Some(BoxHit::new(&candidate, &setup))
+        self.tree.closest(self.isa, self.unprepared(ray))
     }
 
     /// Whether a ray enters any box.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        RaySetup::new(ray, self.scale).is_some_and(|setup| self.tree.any(self.isa, &setup))
+        self.tree.any(self.isa, self.unprepared(ray))
     }
 
     /// Fills `hits` with all boxes that a ray enters, by distance of entry, then by index. What
@@ -184,6 +183,12 @@ impl BoxBvh {
             });
             hits.sort_unstable_by(BoxHit::order);
         }
+    }
+
+    /// A ray that its kernels prepare.
+    fn unprepared<'a>(&self, ray: &'a Ray) -> Unprepared<'a> {
+        let scale = self.scale;
+        Unprepared { ray, scale }
     }
 
     /// A ray in the space of the tree; `None` if it can enter nothing.

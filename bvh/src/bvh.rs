@@ -21,7 +21,7 @@ use crate::{
     simd::Isa,
     stats::TreeStats,
     traverse::{
-        kernel::{Candidate, Filter, RaySetup, Watch, power_of_two_below},
+        kernel::{Asked, Candidate, Filter, RaySetup, Unprepared, Watch, power_of_two_below},
         stream::{self, Together, Waiting},
     },
 };
@@ -265,28 +265,26 @@ impl Bvh {
     #[must_use]
     #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_hit_of(&self.setup(ray)?, &mut ())
+        self.closest_hit_of(self.unprepared(ray), &mut ())
     }
 
     /// The closest hit of a ray; adds what it took to `work`.
     #[must_use]
     pub fn closest_hit_with_work(&self, ray: &Ray, work: &mut Work) -> Option<Hit> {
-        self.closest_hit_of(&self.setup(ray)?, work)
+        self.closest_hit_of(self.unprepared(ray), work)
     }
 
     /// Whether a ray hits anything.
     #[must_use]
     #[inline]
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.setup(ray)
-            .is_some_and(|setup| self.any_hit_of(&setup, &mut ()))
+        self.any_hit_of(self.unprepared(ray), &mut ())
     }
 
     /// Whether a ray hits anything; adds what it took to `work`.
     #[must_use]
     pub fn any_hit_with_work(&self, ray: &Ray, work: &mut Work) -> bool {
-        self.setup(ray)
-            .is_some_and(|setup| self.any_hit_of(&setup, work))
+        self.any_hit_of(self.unprepared(ray), work)
     }
 
     /// The closest of the hits that `accept` takes, equal distances decided as ever: a leaf whose
@@ -413,6 +411,13 @@ impl Bvh {
         self.tree.stats(&self.params)
     }
 
+    /// A ray that its kernels prepare.
+    #[inline]
+    fn unprepared<'a>(&self, ray: &'a Ray) -> Unprepared<'a> {
+        let scale = self.scale;
+        Unprepared { ray, scale }
+    }
+
     /// A ray in the space of the tree; `None` if it can hit nothing.
     #[inline]
     pub(crate) fn setup(&self, ray: &Ray) -> Option<RaySetup> {
@@ -420,14 +425,14 @@ impl Bvh {
     }
 
     #[inline]
-    pub(crate) fn closest_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> Option<Hit> {
-        let candidate = self.tree.closest(self.isa, setup, watch)?;
-        Some(self.hit_of(&candidate, setup))
+    pub(crate) fn closest_hit_of<O: Watch>(&self, ray: impl Asked, watch: &mut O) -> Option<Hit> {
+        self.tree
+            .closest(self.isa, ray, watch, |hit, setup| self.hit_of(hit, setup))
     }
 
     #[inline]
-    pub(crate) fn any_hit_of<O: Watch>(&self, setup: &RaySetup, watch: &mut O) -> bool {
-        self.tree.any(self.isa, setup, watch)
+    pub(crate) fn any_hit_of<O: Watch>(&self, ray: impl Asked, watch: &mut O) -> bool {
+        self.tree.any(self.isa, ray, watch)
     }
 
     /// A candidate of its kernels as a hit.

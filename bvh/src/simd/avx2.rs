@@ -190,7 +190,7 @@ lanes_by_intrinsics!(
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<'_, 8>) {
         // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
         let (slots, children) = unsafe {
             let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
@@ -220,7 +220,7 @@ impl Half for F32x8 {
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<16>,
+        stack: &mut Stack<'_, 16>,
     ) {
         for half in 0..2 {
             // SAFETY: AVX2 is available (file header). The loads read eight words each of the
@@ -286,7 +286,7 @@ fn closing(mask: u32) -> __m256i {
 /// Pushes the first `count ≤ 8` of eight entries.
 #[inline(always)]
 pub(super) fn push_eight<const N: usize>(
-    stack: &mut Stack<N>,
+    stack: &mut Stack<'_, N>,
     references: __m256i,
     distances: __m256,
     count: u32,

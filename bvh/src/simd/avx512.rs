@@ -10,14 +10,15 @@
 //! the operations may be safe functions.
 
 use std::arch::x86_64::{
-    __m128, __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_NEQ_OQ, _cvtmask16_u32, _kand_mask16,
-    _mm_add_ps, _mm_and_ps, _mm_and_si128, _mm_andnot_ps, _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps,
-    _mm_loadu_ps, _mm_maskz_compress_epi32, _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps,
-    _mm_permutevar_ps, _mm_set1_epi32, _mm_set1_ps, _mm_setr_epi32, _mm_sllv_epi32, _mm_srlv_epi32,
-    _mm_storeu_ps, _mm_sub_ps, _mm_test_epi32_mask, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps,
-    _mm256_and_si256, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps,
-    _mm256_loadu_ps, _mm256_maskz_compress_epi32, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
-    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
+    __m128, __m256, __m512, __mmask8, __mmask16, _CMP_LE_OQ, _CMP_NEQ_OQ, _cvtmask8_u32,
+    _cvtmask16_u32, _kand_mask8, _kand_mask16, _mm_add_ps, _mm_and_ps, _mm_and_si128,
+    _mm_andnot_ps, _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_maskz_compress_epi32,
+    _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps, _mm_permutevar_ps, _mm_set1_epi32,
+    _mm_set1_ps, _mm_setr_epi32, _mm_sllv_epi32, _mm_srlv_epi32, _mm_storeu_ps, _mm_sub_ps,
+    _mm_test_epi32_mask, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_ps, _mm256_cmp_ps_mask, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps,
+    _mm256_maskz_compress_epi32, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps,
+    _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
     _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_test_epi32_mask,
     _mm256_xor_ps, _mm512_add_ps, _mm512_and_ps, _mm512_and_si512, _mm512_andnot_ps,
     _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_set1_epi32,
@@ -46,7 +47,7 @@ pub(crate) struct Mask4(__m128);
 
 /// The result of a comparison of eight lanes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mask8(__m256);
+pub(crate) struct Mask8(__mmask8);
 
 /// The result of a comparison of sixteen lanes.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +75,7 @@ lanes_by_intrinsics!(
     _mm_movemask_ps,
     /// Sorts by one permutation and closes the gaps by compression, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 4], order: u64, stack: &mut Stack<4>) {
+    fn push_children(self, mask: u32, children: &[u32; 4], order: u64, stack: &mut Stack<'_, 4>) {
         let (reference, distance) = stack.top(4);
         // SAFETY: the instructions are available (file header). The load reads the four words of
         // `children`. By the invariant of the stack, N = 4 entries from the top on lie inside each
@@ -110,12 +111,12 @@ lanes_by_intrinsics!(
     _mm256_and_ps,
     _mm256_andnot_ps,
     _mm256_xor_ps,
-    _mm256_cmp_ps,
-    _mm256_and_ps,
-    _mm256_movemask_ps,
+    _mm256_cmp_ps_mask,
+    _kand_mask8,
+    _cvtmask8_u32,
     /// As with four lanes.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<8>) {
+    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<'_, 8>) {
         let (reference, distance) = stack.top(8);
         // SAFETY: as with four lanes, for eight.
         unsafe {
@@ -156,7 +157,7 @@ lanes_by_intrinsics!(
     _cvtmask16_u32,
     /// As with four lanes; the upper eight slots are in the upper half of `order`.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
+    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<'_, 16>) {
         let (reference, distance) = stack.top(16);
         // SAFETY: as with four lanes, for sixteen.
         unsafe {

@@ -13,7 +13,7 @@ use super::{avx2, avx512};
 use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
-        kernel::{self, Candidate, RaySetup, Watch},
+        kernel::{self, Asked, Candidate, RaySetup, Watch},
         stream::{self, Together, Waiting},
         triangle::TriangleTest,
     },
@@ -67,26 +67,27 @@ impl Width<16> for Widths {
     type Avx512 = avx512::F32x16;
 }
 
-/// The closest hit of a ray with a tree.
+/// What `tell` makes of the closest hit of a ray with a tree.
 #[inline]
-pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
+pub(crate) fn closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch, H>(
     isa: Isa,
     tree: &Tree<N, W, B>,
-    ray: &RaySetup,
+    ray: impl Asked,
     watch: &mut O,
-) -> Option<Candidate>
+    tell: impl FnOnce(&Candidate, &RaySetup) -> H,
+) -> Option<H>
 where
     Widths: Width<N>,
 {
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree holds `Isa::Avx2` only if it was detected (`Bvh::with_isa`).
-        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, O>(tree, ray, watch) },
+        Isa::Avx2 => unsafe { closest_avx2::<N, W, B, A, O, H, _, _>(tree, ray, watch, tell) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above, for `Isa::Avx512`.
-        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, O>(tree, ray, watch) },
-        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(
-            tree, ray, watch,
+        Isa::Avx512 => unsafe { closest_avx512::<N, W, B, A, O, H, _, _>(tree, ray, watch, tell) },
+        _ => kernel::closest::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O, H>(
+            tree, ray, watch, tell,
         ),
     }
 }
@@ -96,7 +97,7 @@ where
 pub(crate) fn any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
     isa: Isa,
     tree: &Tree<N, W, B>,
-    ray: &RaySetup,
+    ray: impl Asked,
     watch: &mut O,
 ) -> bool
 where
@@ -105,10 +106,10 @@ where
     match isa {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, O>(tree, ray, watch) },
+        Isa::Avx2 => unsafe { any_avx2::<N, W, B, A, O, _>(tree, ray, watch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as in `closest`.
-        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, O>(tree, ray, watch) },
+        Isa::Avx512 => unsafe { any_avx512::<N, W, B, A, O, _>(tree, ray, watch) },
         _ => kernel::any::<N, W, B, A, <Widths as Width<N>>::Portable, f32x4, O>(tree, ray, watch),
     }
 }
@@ -225,23 +226,33 @@ macro_rules! entries {
         }
 
         #[target_feature(enable = $features)]
-        fn $closest<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
+        fn $closest<
+            const N: usize,
+            const W: usize,
+            B: Block,
+            A: TriangleTest<B>,
+            O: Watch,
+            H,
+            R: Asked,
+            F: FnOnce(&Candidate, &RaySetup) -> H,
+        >(
             tree: &Tree<N, W, B>,
-            ray: &RaySetup,
+            ray: R,
             watch: &mut O,
-        ) -> Option<Candidate>
+            tell: F,
+        ) -> Option<H>
         where
             Widths: Width<N>,
         {
-            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O>(
-                tree, ray, watch,
+            kernel::closest::<N, W, B, A, <Widths as Width<N>>::$lanes, avx2::F32x4, O, H>(
+                tree, ray, watch, tell,
             )
         }
 
         #[target_feature(enable = $features)]
-        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch>(
+        fn $any<const N: usize, const W: usize, B: Block, A: TriangleTest<B>, O: Watch, R: Asked>(
             tree: &Tree<N, W, B>,
-            ray: &RaySetup,
+            ray: R,
             watch: &mut O,
         ) -> bool
         where

@@ -71,7 +71,7 @@ pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
         mask: u32,
         children: &[u32; N],
         order: u64,
-        stack: &mut stack::Stack<N>,
+        stack: &mut stack::Stack<'_, N>,
     ) {
         let distances = self.store();
         let bits = N.trailing_zeros();

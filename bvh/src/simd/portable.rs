@@ -163,7 +163,7 @@ pub(crate) trait Half: PushChildren<8> {
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<16>,
+        stack: &mut Stack<'_, 16>,
     ) {
         let distances = both.store();
         for k in 0..16 {
@@ -259,7 +259,7 @@ impl<L: Half> Lanes<16> for Halves<L> {
 
 impl<L: Half> PushChildren<16> for Halves<L> {
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<16>) {
+    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<'_, 16>) {
         L::push_children_of_both(self, mask, children, order, stack);
     }
 }

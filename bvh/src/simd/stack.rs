@@ -12,24 +12,54 @@ use std::mem::MaybeUninit;
 /// Levels of the deepest tree that `max_depth` allows.
 pub(crate) const MAX_LEVELS: usize = 64;
 
-/// The stack for nodes of `N` children. The arrays are used as flat ones.
+/// Room for the entries of a stack for nodes of `N` children. The arrays are used as flat ones.
 #[derive(Debug)]
-pub(crate) struct Stack<const N: usize> {
+pub(crate) struct StackMemory<const N: usize> {
     references: [[MaybeUninit<u32>; N]; MAX_LEVELS - 1],
     distances: [[MaybeUninit<f32>; N]; MAX_LEVELS - 1],
-    top: usize,
+    /// Entries of a stack that was left.
+    left: usize,
 }
 
-impl<const N: usize> Stack<N> {
-    const CAPACITY: usize = N * (MAX_LEVELS - 1);
-
+impl<const N: usize> StackMemory<N> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self {
             references: [const { [const { MaybeUninit::uninit() }; N] }; MAX_LEVELS - 1],
             distances: [const { [const { MaybeUninit::uninit() }; N] }; MAX_LEVELS - 1],
-            top: 0,
+            left: 0,
         }
+    }
+}
+
+/// The stack for nodes of `N` children. It is apart from its memory, so that `top` stays in a register: next to arrays
+/// with computed places it would be stored and loaded again at every push and pop.
+#[derive(Debug)]
+pub(crate) struct Stack<'a, const N: usize> {
+    memory: &'a mut StackMemory<N>,
+    top: usize,
+}
+
+impl<'a, const N: usize> Stack<'a, N> {
+    const CAPACITY: usize = N * (MAX_LEVELS - 1);
+
+    /// An empty stack.
+    #[inline(always)]
+    pub(crate) fn new(memory: &'a mut StackMemory<N>) -> Self {
+        Self { memory, top: 0 }
+    }
+
+    /// The stack that was left in `memory`.
+    #[inline(always)]
+    pub(crate) fn resume(memory: &'a mut StackMemory<N>) -> Self {
+        let top = memory.left;
+        Self { memory, top }
+    }
+
+    /// Leaves its entries in its memory.
+    #[inline(always)]
+    pub(crate) fn leave(self) {
+        self.memory.left = self.top;
     }
 
     /// Pushes an entry if `bit` is 1, without a branch; `bit` is 0 or 1.
@@ -38,8 +68,8 @@ impl<const N: usize> Stack<N> {
         debug_assert!(self.top < Self::CAPACITY);
         // The index is in bounds by the invariant; min() lets the compiler see it for free.
         let at = self.top.min(Self::CAPACITY - 1);
-        self.references.as_flattened_mut()[at] = MaybeUninit::new(reference);
-        self.distances.as_flattened_mut()[at] = MaybeUninit::new(distance);
+        self.memory.references.as_flattened_mut()[at] = MaybeUninit::new(reference);
+        self.memory.distances.as_flattened_mut()[at] = MaybeUninit::new(distance);
         self.top += bit as usize;
     }
 
@@ -49,12 +79,14 @@ impl<const N: usize> Stack<N> {
     pub(super) fn top(&mut self, lanes: usize) -> (*mut u32, *mut f32) {
         debug_assert!(self.top + lanes <= Self::CAPACITY);
         (
-            self.references
+            self.memory
+                .references
                 .as_flattened_mut()
                 .as_mut_ptr()
                 .cast::<u32>()
                 .wrapping_add(self.top),
-            self.distances
+            self.memory
+                .distances
                 .as_flattened_mut()
                 .as_mut_ptr()
                 .cast::<f32>()
@@ -72,31 +104,42 @@ impl<const N: usize> Stack<N> {
         self.top += count as usize;
     }
 
-    /// Forgets all entries.
-    #[inline(always)]
-    pub(crate) fn clear(&mut self) {
-        self.top = 0;
-    }
-
     /// The reference of the top entry.
     #[inline(always)]
     pub(crate) fn peek(&self) -> Option<u32> {
-        let at = self.top.checked_sub(1)?.min(Self::CAPACITY - 1);
+        let at = self.top.checked_sub(1)?;
         // SAFETY: as in `pop`.
-        unsafe { Some(self.references.as_flattened()[at].assume_init()) }
+        unsafe {
+            Some(
+                self.memory
+                    .references
+                    .as_flattened()
+                    .get_unchecked(at)
+                    .assume_init(),
+            )
+        }
     }
 
     /// Takes the top entry: its reference and its distance.
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<(u32, f32)> {
         self.top = self.top.checked_sub(1)?;
-        let at = self.top.min(Self::CAPACITY - 1);
-        let (references, distances) = (
-            self.references.as_flattened(),
-            self.distances.as_flattened(),
-        );
-        // SAFETY: entries below the old `top` are initialised by the invariant: `top` is raised
-        // only past entries that have been written.
-        unsafe { Some((references[at].assume_init(), distances[at].assume_init())) }
+        debug_assert!(self.top < Self::CAPACITY);
+        // SAFETY: by the invariant `top` was at most CAPACITY before, and all entries below it were
+        // written: it is raised only past such.
+        unsafe {
+            Some((
+                self.memory
+                    .references
+                    .as_flattened()
+                    .get_unchecked(self.top)
+                    .assume_init(),
+                self.memory
+                    .distances
+                    .as_flattened()
+                    .get_unchecked(self.top)
+                    .assume_init(),
+            ))
+        }
     }
 }

@@ -19,7 +19,10 @@ use crate::{
         tree::Tree,
     },
     ray::Ray,
-    simd::{Lanes, PushChildren, splat_all, stack::Stack},
+    simd::{
+        Lanes, PushChildren, splat_all,
+        stack::{Stack, StackMemory},
+    },
 };
 
 /// How many rays go together.
@@ -174,7 +177,7 @@ struct Entry {
 pub(super) struct Packets<const N: usize, P> {
     members: Vec<Member<P>>,
     waiting: Vec<Entry>,
-    stack: Stack<N>,
+    memory: StackMemory<N>,
 }
 
 impl<const N: usize, P> Packets<N, P> {
@@ -183,7 +186,7 @@ impl<const N: usize, P> Packets<N, P> {
         Self {
             members: Vec::new(),
             waiting: Vec::new(),
-            stack: Stack::new(),
+            memory: StackMemory::new(),
         }
     }
 
@@ -202,14 +205,14 @@ impl<const N: usize, P> Packets<N, P> {
     {
         let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
         let mut best = Best::none(ray.t_max);
-        self.stack.clear();
-        self.stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        let mut stack = Stack::new(&mut self.memory);
+        stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
         follow::<ANY, N, W, B, A, L, T, ()>(
             tree,
             ray,
             &boxes,
             &A::prepare::<T>(ray),
-            &mut self.stack,
+            &mut stack,
             &mut best,
             &mut (),
         );
@@ -315,14 +318,14 @@ impl<const N: usize, P> Packets<N, P> {
                     }
                 } else {
                     let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
-                    self.stack.clear();
-                    self.stack.push_if(1, reference.0, enter[lane]);
+                    let mut stack = Stack::new(&mut self.memory);
+                    stack.push_if(1, reference.0, enter[lane]);
                     follow::<ANY, N, W, B, A, L, T, ()>(
                         tree,
                         ray,
                         &boxes,
                         prepared,
-                        &mut self.stack,
+                        &mut stack,
                         best,
                         &mut (),
                     );

@@ -15,7 +15,10 @@ use super::{
 use crate::{
     layout::{block::Block, node::ChildRef, tree::Tree},
     ray::Ray,
-    simd::{Lanes, PushChildren, prefetch_all, stack::Stack},
+    simd::{
+        Lanes, PushChildren, prefetch_all,
+        stack::{Stack, StackMemory},
+    },
 };
 
 /// Most rays in flight: more than a core can have in its queues of misses.
@@ -84,7 +87,7 @@ struct Traveller<const N: usize, L, P> {
     boxes: BoxLanes<L>,
     prepared: P,
     best: Best,
-    stack: Stack<N>,
+    waiting: StackMemory<N>,
 }
 
 impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
@@ -94,14 +97,14 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         A: TriangleTest<B, Ray<T> = P>,
         T: Lanes<4>,
     {
-        let mut stack = Stack::new();
-        stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        let mut waiting = StackMemory::new();
+        start(&mut waiting, ray.t_min);
         Self {
             place,
             boxes: BoxLanes::new(&ray, A::margin(&ray)),
             prepared: A::prepare::<T>(&ray),
             best: Best::none(ray.t_max),
-            stack,
+            waiting,
             ray,
         }
     }
@@ -117,8 +120,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         self.boxes = BoxLanes::new(&ray, A::margin(&ray));
         self.prepared = A::prepare::<T>(&ray);
         self.best = Best::none(ray.t_max);
-        self.stack.clear();
-        self.stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
+        start(&mut self.waiting, ray.t_min);
         self.ray = ray;
     }
 
@@ -130,8 +132,9 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         A: TriangleTest<B, Ray<T> = P>,
         T: Lanes<4>,
     {
+        let mut stack = Stack::resume(&mut self.waiting);
         let reference = loop {
-            let Some((reference, distance)) = self.stack.pop() else {
+            let Some((reference, distance)) = stack.pop() else {
                 return false;
             };
             if distance <= self.best.t {
@@ -154,14 +157,23 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
             let (enter, mask) = self.boxes.test(node, self.best.t);
             if mask != 0 {
                 let order = order_of::<ANY, N, W>(node, self.ray.octant());
-                enter.push_children(mask, &node.children, order, &mut self.stack);
+                enter.push_children(mask, &node.children, order, &mut stack);
             }
         }
-        if let Some(next) = self.stack.peek() {
+        if let Some(next) = stack.peek() {
             ask_for(tree, ChildRef(next));
         }
+        stack.leave();
         true
     }
+}
+
+/// Leaves the root to be visited.
+#[inline(always)]
+fn start<const N: usize>(memory: &mut StackMemory<N>, t_min: f32) {
+    let mut stack = Stack::new(memory);
+    stack.push_if(1, ChildRef::inner(0).0, t_min);
+    stack.leave();
 }
 
 /// Asks for what is behind a reference.
