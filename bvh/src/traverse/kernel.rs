@@ -197,8 +197,8 @@ impl Asked for &RaySetup {
 }
 
 /// A ray that the kernel prepares itself, as [`RaySetup::new`] does: what it finds stays in registers. Prepared
-/// outside, its parts would be stored one by one and loaded several at once, which waits for the stores: that took 5 %
-/// of the time of an ordinary ray.
+/// outside, its parts would be stored one by one and loaded several at once, which waits for the stores: about 4 ns,
+/// a sixth of the time of a ray that misses the root.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unprepared<'a> {
     pub(crate) ray: &'a Ray,
