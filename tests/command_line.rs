@@ -178,6 +178,10 @@ fn usage_errors_have_exit_code_2_and_advice() {
             "spatial-splits",
         ),
         (&["render", "interior", "-D", "max_depth"], "NAME=VALUE"),
+        (
+            &["render", "interior", "-D", "ray_packets=on"],
+            "one at a time",
+        ),
         (&["render", "interior", "--isa", "sse9"], "portable"),
         (&["render", "interior", "--spp", "0"], "spp"),
         (&["render", "interior", "--width", "0"], "0"),

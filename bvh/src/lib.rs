@@ -46,7 +46,7 @@ pub use hierarchy::{BuildPrimitive, Corners, Hierarchy, HierarchyNode};
 pub use instances::{Instance, InstanceHit, InstancedBvh};
 pub use mesh::{MeshError, TriangleMesh};
 pub use params::{
-    Accuracy, BuildParams, Dynamics, LeafFormat, PARAMETERS, Parameter, ParameterRange,
+    Accuracy, BuildParams, Collapse, Dynamics, LeafFormat, PARAMETERS, Parameter, ParameterRange,
     ParameterValue, Quality, RayPackets, Rounding,
 };
 pub use ray::{Hit, Ray, Work};

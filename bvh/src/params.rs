@@ -28,6 +28,18 @@ pub enum Quality {
     Optimized,
 }
 
+/// How nodes come to have more than two children, with binned SAH and spatial splits. (Morton trees have one way, the
+/// other qualities are always collapsed at least cost.)
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Collapse {
+    /// While the tree is built: the child with the largest box is divided until there are enough. What Embree does, and
+    /// the faster build.
+    LargestFirst,
+    /// Afterwards, from a binary tree whose leaves have at most `min_leaf_size` primitives: the wide nodes and the leaves
+    /// that cost least together. The faster tree.
+    LeastCost,
+}
+
 /// Whose rounding the builder follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rounding {
@@ -136,10 +148,12 @@ const QUALITIES: [&str; 5] = [
     "optimized",
 ];
 
+const COLLAPSES: [&str; 2] = ["largest-first", "least-cost"];
+
 const COST_LIMIT: f32 = 1000.0;
 
 /// The eleven parameters of the paper's Table 1 in its order, then those of this crate alone.
-pub const PARAMETERS: [Parameter; 16] = [
+pub const PARAMETERS: [Parameter; 17] = [
     Parameter {
         name: "quality",
         range: ParameterRange::Words(&QUALITIES),
@@ -239,6 +253,13 @@ pub const PARAMETERS: [Parameter; 16] = [
         meaning: "most exchanges of subtrees below each node of a Morton tree; no effect on others",
     },
     Parameter {
+        name: "collapse",
+        range: ParameterRange::Words(&COLLAPSES),
+        tuned: ParameterRange::Words(&COLLAPSES),
+        changes_hits: false,
+        meaning: "how binned-sah and spatial-splits make wide nodes: dividing the largest child, or from a binary tree",
+    },
+    Parameter {
         name: "rays_in_flight",
         range: ParameterRange::Integers(1, MAX_IN_FLIGHT as u32),
         // For whoever traces batches; the path tracer traces one ray at a time. (Paths in batches were slower on three
@@ -294,6 +315,8 @@ pub struct BuildParams {
     /// time to build, a tree that is faster to trace; 0..=16. Acts on Morton order alone. 1 is what
     /// Embree does in its own scenes with nodes of four.
     pub rotations: u32,
+    /// How nodes come to have more than two children. Acts on binned SAH and spatial splits alone.
+    pub collapse: Collapse,
     /// How many rays of a batch (`Bvh::closest_hits`) a core traces in turns, 1..=32, so that one works while another
     /// waits for memory. What is fastest depends on scene and rays: several often serve rays that go in all directions,
     /// 1 those that are short or find the same nodes.
@@ -329,6 +352,7 @@ impl BuildParams {
             split_budget: 1.2,
             rounding: Rounding::Exact,
             rotations: 0,
+            collapse: Collapse::LargestFirst,
             rays_in_flight: 1,
             ray_packets: RayPackets::Off,
         }
@@ -348,14 +372,15 @@ impl BuildParams {
         }
     }
 
-    /// Binned SAH for nodes of sixteen, which AVX-512 tests in one go. A visit of such a node costs
-    /// about what two of the narrower ones do: rays on Sponza and Conference are 2 to 3 % faster than
-    /// with a traversal cost of 1, and 6 to 15 % faster than through nodes of eight.
+    /// Binned SAH, collapsed at least cost: a build that takes longer than [`Self::embree_scene_medium`], a tree that is
+    /// faster to trace. Nodes of 16 serve AVX-512, which tests one in one go, nodes of 8 the others.
     #[must_use]
-    pub const fn sixteen_children() -> Self {
+    pub const fn least_cost(branching_factor: u32) -> Self {
         Self {
-            branching_factor: 16,
-            traversal_cost: 2.0,
+            branching_factor,
+            collapse: Collapse::LeastCost,
+            min_leaf_size: 3,
+            intersection_cost: 0.6,
             ..Self::embree_scene_medium()
         }
     }
@@ -461,6 +486,10 @@ impl BuildParams {
                 Rounding::Embree => "embree",
             }),
             "rotations" => Integer(self.rotations),
+            "collapse" => Choice(match self.collapse {
+                Collapse::LargestFirst => "largest-first",
+                Collapse::LeastCost => "least-cost",
+            }),
             "rays_in_flight" => Integer(self.rays_in_flight),
             "ray_packets" => Choice(match self.ray_packets {
                 RayPackets::Off => "off",
@@ -536,6 +565,13 @@ impl BuildParams {
                 }
             }
             "rotations" => self.rotations = integer()?,
+            "collapse" => {
+                self.collapse = match text {
+                    "largest-first" => Collapse::LargestFirst,
+                    "least-cost" => Collapse::LeastCost,
+                    _ => return Err(not_understood()),
+                }
+            }
             "rays_in_flight" => self.rays_in_flight = integer()?,
             "ray_packets" => {
                 self.ray_packets = match text {
@@ -554,7 +590,7 @@ impl BuildParams {
     /// of two that brings the intersection cost into 1..2 (exact in binary arithmetic; an
     /// intersection cost of 0 leaves the traversal cost alone), and what the quality does not look
     /// at set to one value: block size and costs with Morton order, the split budget without
-    /// splits, rotations without Morton order.
+    /// splits, rotations without Morton order, the collapse where there is one way.
     #[must_use]
     pub fn canonical(&self) -> Self {
         let scale = match self.intersection_cost {
@@ -579,7 +615,19 @@ impl BuildParams {
         if !matches!(self.quality, Quality::SpatialSplits | Quality::Optimized) {
             canonical.split_budget = Self::embree_api_default().split_budget;
         }
+        if !matches!(self.quality, Quality::BinnedSah | Quality::SpatialSplits) {
+            canonical.collapse = Self::embree_api_default().collapse;
+        }
         canonical
+    }
+
+    /// Whether a binary tree is collapsed at least cost.
+    pub(crate) fn is_collapsed(&self) -> bool {
+        match self.quality {
+            Quality::Morton => false,
+            Quality::BinnedSah | Quality::SpatialSplits => self.collapse == Collapse::LeastCost,
+            Quality::Agglomerative | Quality::Optimized => true,
+        }
     }
 
     /// The most references that are made of `n` primitives.

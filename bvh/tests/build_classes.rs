@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{and_rotated, bits, built_qualities, contents, pool, primitives, random_rays, sphere};
+use common::{
+    and_variants, bits, built_qualities, contents, pool, primitives, random_rays, sphere,
+};
 use raywright_bvh::{
     Accuracy, BuildError, BuildParams, BuildWorkspace, Bvh, Corners, Hierarchy, LeafReference,
     MeshError, ParameterFault, Quality, Ray, TriangleMesh, Vec3, reference,
@@ -11,7 +13,7 @@ use raywright_bvh::{
 
 const WIDTHS: [u32; 4] = [2, 4, 8, 16];
 
-/// Every built quality × width; Morton order with and without rotations.
+/// Every built quality × width; Morton order with and without rotations, binned ones collapsed in both ways.
 fn all_params() -> Vec<BuildParams> {
     let qualities = built_qualities();
     let pairs = qualities
@@ -27,7 +29,7 @@ fn all_params() -> Vec<BuildParams> {
             params
         })
         .collect();
-    and_rotated(all)
+    and_variants(all)
 }
 
 /// Leaves of one primitive: the deepest tree.

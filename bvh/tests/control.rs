@@ -6,8 +6,8 @@ use std::sync::{
 };
 
 use raywright_bvh::{
-    BuildControl, BuildError, BuildParams, BuildWorkspace, Bvh, PARAMETERS, ParameterRange,
-    TriangleMesh, Vec3,
+    BuildControl, BuildError, BuildParams, BuildWorkspace, Bvh, Collapse, PARAMETERS,
+    ParameterRange, Quality, TriangleMesh, Vec3,
 };
 
 /// A terrain of 2 n² triangles.
@@ -33,7 +33,13 @@ fn every_quality() -> Vec<BuildParams> {
         params.set("quality", word).unwrap();
         params
     });
-    params.collect()
+    let mut all: Vec<BuildParams> = params.collect();
+    let mut collapsed = BuildParams::default();
+    collapsed.collapse = Collapse::LeastCost;
+    all.push(collapsed);
+    collapsed.quality = Quality::SpatialSplits;
+    all.push(collapsed);
+    all
 }
 
 #[test]

@@ -7,8 +7,9 @@
 
 use proptest::prelude::*;
 use raywright_bvh::{
-    Accuracy, BuildError, BuildParams, Bvh, Hit, Isa, LeafFormat, Quality, Ray, RayPackets,
-    TriangleMesh, Vec3, reference,
+    Accuracy, BuildError, BuildParams, Bvh,
+    Collapse::{LargestFirst, LeastCost},
+    Hit, Isa, LeafFormat, Quality, Ray, RayPackets, TriangleMesh, Vec3, reference,
 };
 
 /// Distance, weights, geometry, primitive.
@@ -187,17 +188,29 @@ fn params() -> impl Strategy<Value = BuildParams> {
         0f32..10.0,
         0u32..4,
         prop::sample::select(vec![
-            Quality::Morton,
-            Quality::Agglomerative,
-            Quality::BinnedSah,
-            Quality::SpatialSplits,
-            Quality::Optimized,
+            (Quality::Morton, LargestFirst),
+            (Quality::Agglomerative, LargestFirst),
+            (Quality::BinnedSah, LargestFirst),
+            (Quality::BinnedSah, LeastCost),
+            (Quality::SpatialSplits, LargestFirst),
+            (Quality::SpatialSplits, LeastCost),
+            (Quality::Optimized, LargestFirst),
         ]),
     )
         .prop_map(
-            |(depth, block, min_leaf, max_leaf, traversal, intersection, rotations, quality)| {
+            |(
+                depth,
+                block,
+                min_leaf,
+                max_leaf,
+                traversal,
+                intersection,
+                rotations,
+                (quality, collapse),
+            )| {
                 let mut params = BuildParams::default();
                 params.quality = quality;
+                params.collapse = collapse;
                 params.split_budget = 2.0;
                 params.max_depth = depth;
                 params.sah_block_size = block;

@@ -6,18 +6,21 @@ use std::alloc::System;
 use cap::Cap;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use raywright_bvh::{
-    Accuracy, BuildParams, BuildWorkspace, Bvh, Dynamics, LeafFormat, Quality, TriangleMesh, Vec3,
+    Accuracy, BuildParams, BuildWorkspace, Bvh, Collapse, Dynamics, LeafFormat, Quality,
+    TriangleMesh, Vec3,
 };
 
 #[global_allocator]
 static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
 
-const QUALITIES: [Quality; 5] = [
-    Quality::Morton,
-    Quality::Agglomerative,
-    Quality::BinnedSah,
-    Quality::SpatialSplits,
-    Quality::Optimized,
+const WAYS: [(Quality, Collapse); 7] = [
+    (Quality::Morton, Collapse::LargestFirst),
+    (Quality::Agglomerative, Collapse::LargestFirst),
+    (Quality::BinnedSah, Collapse::LargestFirst),
+    (Quality::BinnedSah, Collapse::LeastCost),
+    (Quality::SpatialSplits, Collapse::LargestFirst),
+    (Quality::SpatialSplits, Collapse::LeastCost),
+    (Quality::Optimized, Collapse::LargestFirst),
 ];
 
 const WIDTHS: [u32; 4] = [2, 4, 7, 16];
@@ -47,16 +50,16 @@ fn pool(threads: usize) -> ThreadPool {
     builder.build().unwrap()
 }
 
-/// Every quality, width, leaf format and accuracy, of a mesh that is built again and again.
+/// Every quality and collapse, width, leaf format and accuracy, of a mesh that is built again and again.
 fn every_setting() -> impl Iterator<Item = BuildParams> {
     let formats = [LeafFormat::Edges, LeafFormat::Compact];
     let accuracies = [Accuracy::Fast, Accuracy::Robust];
-    QUALITIES.into_iter().flat_map(move |quality| {
+    WAYS.into_iter().flat_map(move |way| {
         WIDTHS.into_iter().flat_map(move |width| {
             formats.into_iter().flat_map(move |leaf_format| {
                 accuracies.into_iter().map(move |accuracy| {
                     let mut params = BuildParams::default();
-                    params.quality = quality;
+                    (params.quality, params.collapse) = way;
                     params.branching_factor = width;
                     params.leaf_format = leaf_format;
                     params.accuracy = accuracy;
@@ -93,11 +96,11 @@ fn a_long_run(single: bool) {
     let (mut live, mut peak, mut asked) = (0, 0, 0);
     for build in 0..REBUILDS {
         let mut params = BuildParams::default();
-        params.quality = QUALITIES[build % QUALITIES.len()];
+        (params.quality, params.collapse) = WAYS[build % WAYS.len()];
         let tree = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
         tree.recycle(&mut workspace);
         let now = ALLOCATOR.allocated();
-        if build < 3 * QUALITIES.len() {
+        if build < 3 * WAYS.len() {
             (live, peak, asked) = (now, ALLOCATOR.max_allocated(), asked_for());
             continue;
         }
@@ -175,9 +178,9 @@ fn settings_in_turn_share_memory_and_old_ones_are_freed() {
 /// With `static` the memory is given back: each build takes the same anew.
 fn a_static_build_leaves_nothing() {
     let mesh = terrain(20);
-    for quality in QUALITIES {
+    for way in WAYS {
         let mut params = BuildParams::default();
-        params.quality = quality;
+        (params.quality, params.collapse) = way;
         params.dynamics = Dynamics::Static;
         let mut workspace = BuildWorkspace::default();
         let live = ALLOCATOR.allocated();
@@ -187,8 +190,8 @@ fn a_static_build_leaves_nothing() {
             let tree = Bvh::build_in(&[&mesh], &params, &mut workspace).unwrap();
             *taken = asked_for() - asked;
             tree.recycle(&mut workspace);
-            assert_eq!(ALLOCATOR.allocated(), live, "{quality:?}");
+            assert_eq!(ALLOCATOR.allocated(), live, "{way:?}");
         }
-        assert_eq!(taken, [taken[0]; 4], "{quality:?}");
+        assert_eq!(taken, [taken[0]; 4], "{way:?}");
     }
 }

@@ -6,8 +6,8 @@ mod common;
 use common::{Random, built_qualities, sphere};
 use rayon::ThreadPoolBuilder;
 use raywright_bvh::{
-    Aabb, Accuracy, BoxBvh, BuildError, BuildParams, BuildWorkspace, Bvh, LeafFormat, TriangleMesh,
-    Vec3,
+    Aabb, Accuracy, BoxBvh, BuildError, BuildParams, BuildWorkspace, Bvh, Collapse, LeafFormat,
+    TriangleMesh, Vec3,
 };
 
 /// Any quality, width, leaf size, leaf format and accuracy.
@@ -20,6 +20,9 @@ fn random_params(random: &mut Random) -> BuildParams {
     params.max_leaf_size = 1 + draw(12) as u32;
     params.max_depth = 64;
     params.split_budget = 1.5;
+    if draw(2) == 0 {
+        params.collapse = Collapse::LeastCost;
+    }
     if draw(2) == 0 {
         params.leaf_format = LeafFormat::Compact;
     }

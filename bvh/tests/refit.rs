@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{and_rotated, bits, built_qualities, random_rays, sphere};
+use common::{and_variants, bits, built_qualities, random_rays, sphere};
 use proptest::prelude::*;
 use raywright_bvh::{
     Accuracy, BuildError, BuildParams, Bvh, LeafFormat, MeshError, Quality, Ray, RefitError,
@@ -28,7 +28,7 @@ fn all_params() -> Vec<BuildParams> {
             }
         }
     }
-    and_rotated(all)
+    and_variants(all)
 }
 
 fn moved(mesh: &TriangleMesh, map: impl Fn(Vec3) -> Vec3) -> TriangleMesh {

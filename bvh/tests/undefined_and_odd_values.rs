@@ -4,13 +4,13 @@
 
 mod common;
 
-use common::{and_rotated, built_qualities, contents, primitives, sphere};
+use common::{and_variants, built_qualities, contents, primitives, sphere};
 use raywright_bvh::{
     Aabb, BuildError, BuildParams, BuildPrimitive, BuildWorkspace, Bvh, Corners, Hierarchy,
     LeafReference, ParameterFault, Quality, Rounding, TriangleMesh, Vec3,
 };
 
-/// Every built quality with both roundings; Morton order with and without rotations.
+/// Every built quality with both roundings; Morton order with and without rotations, binned ones collapsed in both ways.
 fn all_params() -> Vec<BuildParams> {
     let mut all = Vec::new();
     for quality in built_qualities() {
@@ -21,7 +21,7 @@ fn all_params() -> Vec<BuildParams> {
             all.push(params);
         }
     }
-    and_rotated(all)
+    and_variants(all)
 }
 
 fn hierarchy(

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use raywright::{
-    bvh::{BuildParams, Isa, PARAMETERS, ParameterRange},
+    bvh::{BuildParams, Isa, PARAMETERS, Parameter, ParameterRange},
     imaging::CancelToken,
 };
 
@@ -47,6 +47,16 @@ fn isa(name: &str) -> Result<Isa, String> {
     }
 }
 
+/// Parameters of batches of rays. Every command traces one ray at a time, so they are none of its options.
+const OF_BATCHES: [&str; 2] = ["rays_in_flight", "ray_packets"];
+
+/// The parameters that commands have.
+fn parameters() -> impl Iterator<Item = &'static Parameter> {
+    PARAMETERS
+        .iter()
+        .filter(|parameter| !OF_BATCHES.contains(&parameter.name))
+}
+
 /// BVH parameters on a command line.
 #[derive(Clone, Debug, Default, Args)]
 pub(crate) struct ParameterOptions {
@@ -71,6 +81,14 @@ impl ParameterOptions {
                     "write -D NAME=VALUE",
                 ));
             };
+            if OF_BATCHES.contains(&name) {
+                return Err(Failure::with_hint(
+                    anyhow::anyhow!(
+                        "{name} acts on rays that a program traces in batches; commands trace them one at a time"
+                    ),
+                    parameter_names(),
+                ));
+            }
             params
                 .set(name, value)
                 .map_err(|fault| Failure::with_hint(fault, hint(name)))?;
@@ -100,7 +118,7 @@ impl ParameterOptions {
 /// The parameter table, for help.
 pub(crate) fn parameter_help() -> String {
     let default = BuildParams::default();
-    let rows = PARAMETERS.iter().map(|parameter| {
+    let rows = parameters().map(|parameter| {
         let range = match parameter.range {
             ParameterRange::Integers(min, max) => format!("{min}..={max}"),
             ParameterRange::Reals(min, max) => format!("{min}..={max} (real)"),
@@ -127,8 +145,7 @@ pub(crate) fn parameter_help() -> String {
 
 /// Advice for a name that is none: the nearest one that is.
 fn hint(name: &str) -> String {
-    let nearest = PARAMETERS
-        .iter()
+    let nearest = parameters()
         .map(|p| p.name)
         .min_by_key(|known| edit_distance(name, known));
     match nearest {
@@ -140,7 +157,8 @@ fn hint(name: &str) -> String {
 }
 
 fn parameter_names() -> String {
-    format!("parameters are {}", PARAMETERS.map(|p| p.name).join(", "))
+    let names: Vec<&str> = parameters().map(|p| p.name).collect();
+    format!("parameters are {}", names.join(", "))
 }
 
 /// Single-letter changes that turn one word into the other (Levenshtein).

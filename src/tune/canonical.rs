@@ -10,7 +10,7 @@
 //! | branching_factor | 16 too, which has nodes of its own |
 //!
 //! Axes are active only where a builder reads them: a Morton build has no cost model, only one with spatial
-//! splits has a budget, only Morton trees are rotated. A pair of which one is fixed keeps the axis of the
+//! splits has a budget, only Morton trees are rotated, and where there is one collapse there is no choice. A pair of which one is fixed keeps the axis of the
 //! other from the table.
 //!
 //! Invariant: with [`parameters`] every configuration becomes valid parameters.
@@ -29,6 +29,7 @@ pub(super) const OURS: &[&str] = &[
     "split_budget",
     "rounding",
     "rotations",
+    "collapse",
     "rays_in_flight",
     "ray_packets",
 ];
@@ -88,6 +89,7 @@ pub(super) fn readers(name: &str) -> Option<&'static [&'static str]> {
         }
         "split_budget" => Some(&["spatial-splits", "optimized"]),
         "rotations" => Some(&["morton"]),
+        "collapse" => Some(&["binned-sah", "spatial-splits"]),
         _ => None,
     }
 }

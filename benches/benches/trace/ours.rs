@@ -20,7 +20,9 @@ const BATCHES: [Calls; 5] = [
 /// What a ray is traced through. Where the width is not said, it is that of [`TreeKind::same`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TreeKind {
-    /// Binned SAH with so many children.
+    /// Binned SAH by Embree's rules, with eight children.
+    AsEmbree,
+    /// Binned SAH collapsed at least cost, with so many children.
     Binned(u32),
     /// Binned SAH with eight children by the kernels for AVX2.
     Avx2,
@@ -58,17 +60,18 @@ impl TreeKind {
 
     fn params(self) -> BuildParams {
         match self {
-            Self::Binned(16) => BuildParams::sixteen_children(),
-            Self::Binned(_) | Self::Avx2 => BuildParams::embree_scene_medium(),
+            Self::Binned(children) => BuildParams::least_cost(children),
+            Self::Avx2 => BuildParams::least_cost(8),
+            Self::AsEmbree => BuildParams::embree_scene_medium(),
             Self::SpatialSplits => {
                 let mut params = Self::same().params();
                 params.quality = Quality::SpatialSplits;
                 params
             }
             Self::Optimized(children) => {
-                let mut params = BuildParams::embree_scene_high();
+                let mut params = BuildParams::least_cost(children);
                 params.quality = Quality::Optimized;
-                params.branching_factor = children;
+                params.split_budget = 1.1;
                 params
             }
             Self::Robust => {
@@ -103,7 +106,10 @@ impl Ours {
     pub(crate) fn can_be_chosen(self) -> bool {
         matches!(
             self.tree,
-            TreeKind::Binned(_) | TreeKind::SpatialSplits | TreeKind::Optimized(_)
+            TreeKind::AsEmbree
+                | TreeKind::Binned(_)
+                | TreeKind::SpatialSplits
+                | TreeKind::Optimized(_)
         )
     }
 }
@@ -111,6 +117,7 @@ impl Ours {
 impl fmt::Display for Ours {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.tree {
+            TreeKind::AsEmbree => write!(f, "as Embree's medium"),
             TreeKind::Binned(children) => write!(f, "binned {children}"),
             TreeKind::Avx2 => write!(f, "binned 8, held to AVX2"),
             TreeKind::SpatialSplits => write!(f, "spatial splits"),
@@ -129,8 +136,9 @@ impl fmt::Display for Ours {
 
 /// All of them. A kind that cannot be built or traced here is left out, and said.
 pub(crate) fn engines(mesh: &TriangleMesh) -> Vec<Engine<'static>> {
-    use TreeKind::{Avx2, Binned, Compact, Optimized, Robust, SpatialSplits};
+    use TreeKind::{AsEmbree, Avx2, Binned, Compact, Optimized, Robust, SpatialSplits};
     let kinds = [
+        AsEmbree,
         Binned(8),
         Binned(16),
         Avx2,

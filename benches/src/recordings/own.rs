@@ -26,7 +26,7 @@ const WEAK_SOURCE: &str = "table-1-default";
 const PORTFOLIO_SOURCE: &str = "portfolio";
 
 /// Parameters that are younger than the recordings: all were made with their defaults.
-const YOUNGER: [&str; 2] = ["rays_in_flight", "ray_packets"];
+const YOUNGER: [&str; 3] = ["collapse", "rays_in_flight", "ray_packets"];
 
 /// A line of a recording.
 #[derive(Clone, Debug)]

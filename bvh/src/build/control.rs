@@ -197,16 +197,14 @@ impl BuildWorkspace {
         let per_reference = match params.quality {
             // Keys and a copy of them to sort.
             Quality::Morton => size_of::<PrimitiveRef>() + record + 2 * size_of::<u64>(),
-            Quality::BinnedSah | Quality::SpatialSplits => 2 * size_of::<PrimitiveRef>() + record,
             // A binary tree and what is known of its nodes besides, which is measured in a test.
-            Quality::Agglomerative | Quality::Optimized => {
-                2 * size_of::<PrimitiveRef>() + record + BINARY_BYTES
-            }
+            _ if params.is_collapsed() => 2 * size_of::<PrimitiveRef>() + record + BINARY_BYTES,
+            _ => 2 * size_of::<PrimitiveRef>() + record,
         };
         let lists = Lists::bytes_needed(capacity, params);
         capacity.saturating_mul(per_reference).saturating_add(lists)
     }
 }
 
-/// Bytes per reference of a binary tree that is optimised and collapsed, at most.
+/// Bytes per reference of a binary tree that is optimised or not, and collapsed, at most.
 const BINARY_BYTES: usize = 768;

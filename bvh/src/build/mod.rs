@@ -68,13 +68,13 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
                 .all(|reference| reference.geometry_id() < primitive::CUT_ID_LIMIT)
     });
     match (params.quality, corners) {
-        (Quality::Optimized, corners) => optimized::<R, C>(
+        (Quality::Agglomerative, _) => agglomerative::build(workspace, params),
+        (Quality::Morton, _) => morton::build::<R>(workspace, params),
+        (_, corners) if params.is_collapsed() => collapsed::<R, C>(
             workspace,
             corners.map(|corners| (capacity, corners)),
             params,
         ),
-        (Quality::Agglomerative, _) => agglomerative::build(workspace, params),
-        (Quality::Morton, _) => morton::build::<R>(workspace, params),
         (_, Some(corners)) => {
             recursion::build_with_cuts::<R, C>(workspace, params, capacity, corners)
         }
@@ -82,19 +82,21 @@ fn build_rounded<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>
     }
 }
 
-/// A binary tree with a leaf for each part of a primitive, optimised and collapsed.
-fn optimized<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
+/// A binary tree, collapsed; optimised before, if the quality says so.
+fn collapsed<R: binning::Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync>(
     workspace: &mut BuildWorkspace,
     cuts: Option<(usize, C)>,
     params: &BuildParams,
 ) -> Result<record::Record, BuildError> {
     let root = recursion::build_binary::<R, C>(workspace, params, cuts)?;
     workspace.binary.load(&workspace.records, &root);
-    reinsertion::optimize(
-        &mut workspace.binary,
-        &mut workspace.reinsertion,
-        &workspace.control,
-    )?;
+    if params.quality == Quality::Optimized {
+        reinsertion::optimize(
+            &mut workspace.binary,
+            &mut workspace.reinsertion,
+            &workspace.control,
+        )?;
+    }
     collapse::collapse(workspace, params)
 }
 

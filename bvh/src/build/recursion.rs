@@ -48,8 +48,8 @@ pub(crate) fn build<R: Rounding>(
     run::<R, NoCorners>(workspace, params, RESERVED_LEVELS, n, None)
 }
 
-/// Builds the records of a binary tree with one reference per leaf, whatever `max_depth` is: one
-/// to be collapsed. `cuts` are a capacity and corners as for [`build_with_cuts`].
+/// Builds the records of a binary tree to be collapsed, whatever `max_depth` is: with one reference per leaf if it is
+/// optimised before, else with the `min_leaf_size` that are not parted by a collapse anyway. `cuts` are a capacity and corners as for [`build_with_cuts`].
 pub(crate) fn build_binary<R: Rounding, C>(
     workspace: &mut BuildWorkspace,
     params: &BuildParams,
@@ -59,10 +59,14 @@ where
     C: Fn(LeafReference) -> [Vec3; 3] + Sync,
 {
     let n = workspace.references.len();
+    let leaf_size = match params.quality {
+        Quality::Optimized => 1,
+        _ => params.canonical().min_leaf_size,
+    };
     let params = BuildParams {
         branching_factor: 2,
-        min_leaf_size: 1,
-        max_leaf_size: 1,
+        min_leaf_size: leaf_size,
+        max_leaf_size: leaf_size,
         max_depth: BINARY_LEVELS,
         ..*params
     };
@@ -319,10 +323,8 @@ impl Lists {
         const SMALLEST_VECTOR: usize = 4;
         let [width, levels] = match params.quality {
             Quality::Morton | Quality::Agglomerative => return 0,
-            Quality::BinnedSah | Quality::SpatialSplits => {
-                [params.branching_factor, params.max_depth]
-            }
-            Quality::Optimized => [2, BINARY_LEVELS],
+            _ if params.is_collapsed() => [2, BINARY_LEVELS],
+            _ => [params.branching_factor, params.max_depth],
         };
         let children = n.saturating_mul(2).min(width as usize * levels as usize);
         2 * children.max(SMALLEST_VECTOR) * size_of::<Span>()

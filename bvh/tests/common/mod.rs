@@ -4,8 +4,8 @@
 #![allow(dead_code)]
 
 use raywright_bvh::{
-    Aabb, BuildParams, BuildPrimitive, Hierarchy, Hit, LeafReference, PARAMETERS, ParameterRange,
-    Quality, Ray, TriangleMesh, Vec3,
+    Aabb, BuildParams, BuildPrimitive, Collapse, Hierarchy, Hit, LeafReference, PARAMETERS,
+    ParameterRange, Quality, Ray, TriangleMesh, Vec3,
 };
 
 pub(crate) type Bits = Option<(u32, u32, u32, u32, u32)>;
@@ -38,17 +38,18 @@ pub(crate) fn built_qualities() -> Vec<Quality> {
     built.iter().map(quality).collect()
 }
 
-/// These, and those of Morton order once more with as many rotations as there may be.
-pub(crate) fn and_rotated(mut all: Vec<BuildParams>) -> Vec<BuildParams> {
-    let morton = all.iter().filter(|p| p.quality == Quality::Morton);
-    let rotated: Vec<_> = morton
-        .map(|&params| {
-            let mut params = params;
-            params.rotations = 16;
-            params
-        })
-        .collect();
-    all.extend(rotated);
+/// These, those of Morton order once more with as many rotations as there may be, and those that are collapsed only where
+/// it is asked for.
+pub(crate) fn and_variants(mut all: Vec<BuildParams>) -> Vec<BuildParams> {
+    for place in 0..all.len() {
+        let mut params = all[place];
+        match params.quality {
+            Quality::Morton => params.rotations = 16,
+            Quality::BinnedSah | Quality::SpatialSplits => params.collapse = Collapse::LeastCost,
+            _ => continue,
+        }
+        all.push(params);
+    }
     all
 }
 

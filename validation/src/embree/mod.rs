@@ -20,7 +20,7 @@ mod sys;
 
 use std::path::PathBuf;
 
-use raywright_bvh::{Aabb, Accuracy, BuildParams, Dynamics, LeafFormat, Quality, Vec3};
+use raywright_bvh::{Aabb, Accuracy, BuildParams, Collapse, Dynamics, LeafFormat, Quality, Vec3};
 
 pub use find::{SEARCHED_FOLDER, VARIABLE};
 pub use sys::{Built, Device, Embree, PreparedScene, Scene};
@@ -121,11 +121,16 @@ pub struct BuildArguments {
 
 impl BuildArguments {
     /// The arguments for our parameters and `n` primitives; `None` for a quality that Embree does
-    /// not have, and for rotations, which it has in its own scenes alone.
+    /// not have, for a collapse at least cost, and for rotations, which it has in its own scenes alone.
     #[must_use]
     pub fn of(params: &BuildParams, n: usize) -> Option<Self> {
         let quality = match params.quality {
             Quality::Morton if params.rotations > 0 => return None,
+            Quality::BinnedSah | Quality::SpatialSplits
+                if params.collapse == Collapse::LeastCost =>
+            {
+                return None;
+            }
             Quality::Morton => BuildQuality::Low,
             Quality::BinnedSah => BuildQuality::Medium,
             Quality::SpatialSplits => BuildQuality::High,

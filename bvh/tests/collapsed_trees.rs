@@ -1,14 +1,23 @@
-//! Trees of optimized quality: any input, any number of threads, no memory beyond the first build.
+//! Binary trees that are collapsed at least cost, optimised or not: any input, any number of threads, no memory beyond the first build.
 
 use raywright_bvh::{
-    Aabb, BuildParams, BuildPrimitive, BuildWorkspace, Bvh, Corners, Hierarchy, HierarchyNode,
-    LeafReference, Quality, TriangleMesh, Vec3,
+    Aabb, BuildParams, BuildPrimitive, BuildWorkspace, Bvh, Collapse, Corners, Hierarchy,
+    HierarchyNode, LeafReference, Quality, TriangleMesh, Vec3,
 };
 
-fn params() -> BuildParams {
-    let mut params = BuildParams::default();
-    params.quality = Quality::Optimized;
-    params
+/// Every quality whose nodes are made by the same collapse of a binary tree that may have cuts.
+fn every_way() -> [BuildParams; 3] {
+    [
+        Quality::Optimized,
+        Quality::BinnedSah,
+        Quality::SpatialSplits,
+    ]
+    .map(|quality| {
+        let mut params = BuildParams::default();
+        params.quality = quality;
+        params.collapse = Collapse::LeastCost;
+        params
+    })
 }
 
 type Triangle = [Vec3; 3];
@@ -84,8 +93,8 @@ fn degenerate_inputs_give_trees_that_hold_everything() {
             .collect(),
     ];
     for triangles in inputs {
-        for branching_factor in [2, 8, 16] {
-            let mut params = params();
+        let widths = [2, 8, 16].into_iter();
+        for (branching_factor, mut params) in widths.flat_map(|w| every_way().map(|p| (w, p))) {
             params.branching_factor = branching_factor;
             let tree = build(&triangles, &params, &mut BuildWorkspace::default());
             let mut found = vec![false; triangles.len()];
@@ -105,18 +114,58 @@ fn degenerate_inputs_give_trees_that_hold_everything() {
 #[test]
 fn nothing_is_cut_without_corners_or_budget() {
     let triangles = soup(2000);
-    let mut whole = params();
-    whole.split_budget = 1.0;
     let references = |params: &BuildParams| {
         let tree = build(&triangles, params, &mut BuildWorkspace::default());
         walked(&tree).iter().map(|node| node.2.len()).sum::<usize>()
     };
-    assert_eq!(references(&whole), 2000);
-    assert!(references(&params()) > 2000);
+    for params in every_way() {
+        let mut whole = params;
+        whole.split_budget = 1.0;
+        assert_eq!(references(&whole), 2000);
+        let cuts = params.quality != Quality::BinnedSah;
+        assert_eq!(references(&params) > 2000, cuts, "{params:?}");
+    }
+}
+
+/// What the collapse minimises, by its own measure: a node costs two traversal costs and a leaf one beside its blocks.
+fn cost(tree: &Hierarchy, params: &BuildParams) -> f64 {
+    fn below(node: HierarchyNode<'_>, params: &BuildParams) -> f64 {
+        let size = node.bounds().max - node.bounds().min;
+        let area = size.x * size.y + size.y * size.z + size.z * size.x;
+        let own = match node.leaf() {
+            Some(leaf) => {
+                let blocks = leaf.len().div_ceil(params.sah_block_size as usize);
+                params.traversal_cost + params.intersection_cost * blocks as f32
+            }
+            None => 2.0 * params.traversal_cost,
+        };
+        let children = node.children().map(|child| below(child, params));
+        f64::from(area * own) + children.sum::<f64>()
+    }
+    below(tree.root().unwrap(), params)
 }
 
 #[test]
-fn rays_cost_less_than_on_cut_or_binned_trees() {
+fn a_collapse_at_least_cost_costs_less_than_dividing_the_largest_child() {
+    let triangles = soup(5000);
+    let cost = |quality, collapse, width| {
+        let mut params = BuildParams::least_cost(width);
+        params.quality = quality;
+        params.collapse = collapse;
+        let tree = build(&triangles, &params, &mut BuildWorkspace::default());
+        cost(&tree, &params)
+    };
+    use Collapse::{LargestFirst, LeastCost};
+    for width in [2, 4, 8, 16] {
+        for quality in [Quality::BinnedSah, Quality::SpatialSplits] {
+            let least = cost(quality, LeastCost, width);
+            assert!(least < 0.99 * cost(quality, LargestFirst, width));
+        }
+    }
+}
+
+#[test]
+fn rays_visit_fewer_nodes_than_in_trees_that_are_not_optimised() {
     let triangles = soup(5000);
     let mesh = TriangleMesh::new(
         triangles.concat(),
@@ -124,7 +173,7 @@ fn rays_cost_less_than_on_cut_or_binned_trees() {
     )
     .unwrap();
     let nodes = |quality| {
-        let mut params = params();
+        let mut params = BuildParams::default();
         params.quality = quality;
         Bvh::build(&[&mesh], &params).unwrap().stats().sah_nodes
     };
@@ -135,13 +184,16 @@ fn rays_cost_less_than_on_cut_or_binned_trees() {
 
 #[test]
 fn a_second_build_takes_no_more_memory() {
-    let (triangles, mut workspace) = (soup(5000), BuildWorkspace::default());
-    let first = walked(&build(&triangles, &params(), &mut workspace));
-    let bytes = workspace.bytes();
-    for _ in 0..2 {
-        let again = walked(&build(&triangles, &params(), &mut workspace));
-        assert_eq!(first, again);
-        assert_eq!(workspace.bytes(), bytes);
+    let triangles = soup(5000);
+    for params in every_way() {
+        let mut workspace = BuildWorkspace::default();
+        let first = walked(&build(&triangles, &params, &mut workspace));
+        let bytes = workspace.bytes();
+        for _ in 0..2 {
+            let again = walked(&build(&triangles, &params, &mut workspace));
+            assert_eq!(first, again);
+            assert_eq!(workspace.bytes(), bytes);
+        }
     }
 }
 
@@ -149,21 +201,17 @@ fn a_second_build_takes_no_more_memory() {
 #[test]
 fn threads_do_not_change_the_tree() {
     let triangles = soup(60_000);
-    let tree = |threads| {
+    let tree = |threads, params: &BuildParams| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| {
-            walked(&build(
-                &triangles,
-                &params(),
-                &mut BuildWorkspace::default(),
-            ))
-        })
+        pool.install(|| walked(&build(&triangles, params, &mut BuildWorkspace::default())))
     };
-    let one = tree(1);
-    for threads in [2, 8] {
-        assert!(one == tree(threads), "{threads} threads");
+    for params in every_way() {
+        let one = tree(1, &params);
+        for threads in [2, 8] {
+            assert!(one == tree(threads, &params), "{threads} threads");
+        }
     }
 }

@@ -1,7 +1,11 @@
 //! How fast is a ray? Node widths and instruction sets of our tree side by side on the built-in
-//! scenes, and with `--features peers` the crate obvhs.
+//! scenes, and with `--features peers` the crate obvhs. Fails if a kernel has lost its instruction set.
 //!
 //! Run: `cargo bench -p raywright-benches --bench rays [--features peers]`
+
+mod instruction_sets;
+
+use std::process::ExitCode;
 
 use raywright_benches::{
     goals::Goals,
@@ -13,6 +17,9 @@ use raywright_tracer::{World, generate};
 
 const ROUNDS: usize = 9;
 
+/// Side of the picture whose rays every kernel is asked about.
+const KERNEL_SIDE: u32 = 64;
+
 /// Something that is asked with rays.
 struct Engine {
     name: String,
@@ -21,8 +28,8 @@ struct Engine {
     any: Box<dyn Fn(&Ray) -> bool>,
 }
 
-fn main() {
-    let mut goals = Goals::default();
+fn main() -> ExitCode {
+    let (mut goals, mut lost) = (Goals::default(), Vec::new());
     for name in generate::NAMES {
         let world = World::new(generate::by_name(name).expect("a built-in scene"));
         let tree = build(&world, 8);
@@ -34,8 +41,21 @@ fn main() {
         for set in ray_sets(&world, &tree, SIDE) {
             table(name, &set, &engines, &tree, &mut goals);
         }
+        let primary = &ray_sets(&world, &tree, KERNEL_SIDE)[0];
+        lost.extend(instruction_sets::lost_kernels(&world, primary));
     }
+    goals.check(
+        "every kernel has its instruction set".to_owned(),
+        lost.is_empty(),
+    );
     goals.print();
+    for kernel in &lost {
+        eprintln!("error: {kernel}");
+    }
+    match lost.is_empty() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    }
 }
 
 fn build(world: &World, branching_factor: u32) -> Bvh {
