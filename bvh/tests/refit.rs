@@ -6,8 +6,8 @@ mod common;
 use common::{and_variants, bits, built_qualities, random_rays, sphere};
 use proptest::prelude::*;
 use raywright_bvh::{
-    Accuracy, BuildError, BuildParams, Bvh, LeafFormat, MeshError, Quality, Ray, RefitError,
-    TriangleMesh, Vec3, Work, reference,
+    Accuracy, BuildError, BuildParams, Bvh, Collapse, LeafFormat, MeshError, Quality, Ray,
+    RefitError, TriangleMesh, Vec3, Work, reference,
 };
 
 /// Parameters of every built quality × width × leaf format × accuracy.
@@ -191,10 +191,15 @@ fn trees_of_parts_of_triangles_are_refitted_to_whole_ones() {
     for mut params in all_params() {
         params.quality = Quality::SpatialSplits;
         let mut tree = Bvh::build(&[&mesh], &params).unwrap();
-        assert!(tree.stats().duplication > 1.2);
+        // Leaves at least cost bring some parts together again.
+        let [duplication, drift] = match params.collapse {
+            Collapse::LargestFirst => [1.2, 1.05],
+            Collapse::LeastCost => [1.05, 1.01],
+        };
+        assert!(tree.stats().duplication > duplication, "{params:?}");
         let refit = tree.refit(&[&mesh]).unwrap();
         assert!(
-            refit.sah_drift() > 1.05,
+            refit.sah_drift() > drift,
             "parts have smaller boxes: {refit:?}"
         );
         tree.refit(&[&other]).unwrap();
