@@ -5,11 +5,11 @@
 //! width, leaf format, accuracy, closest or any hit, rays alone, in turns or side by side) is timed beside its portable
 //! twin; one that is far behind has lost its instruction set.
 
-use raywright_benches::{rays::RaySet, turns::measure};
+use raywright_benches::{clock::Clock, rays::RaySet, turns::measure_chunks};
 use raywright_bvh::{Accuracy, BuildParams, Bvh, Hit, Isa, LeafFormat, Ray, RayPackets};
 use raywright_tracer::World;
 
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 7;
 
 /// A kernel that has its instruction set is faster than this in terms of the portable one; 16 children in portable lanes
 /// and 2 in wide ones come near each other.
@@ -134,7 +134,8 @@ fn every_kernel() -> impl Iterator<Item = BuildParams> {
     })
 }
 
-/// The speeds of trees in terms of the first, which all give its answers.
+/// The speeds of trees in terms of the first, which all give its answers: the upper quartiles, since whoever disturbs
+/// does not disturb most rounds.
 fn speeds(call: Call, trees: &[Bvh], rays: &[Ray]) -> Vec<f64> {
     let mut answers = Answers::default();
     let mut expected = Answers::default();
@@ -143,9 +144,9 @@ fn speeds(call: Call, trees: &[Bvh], rays: &[Ray]) -> Vec<f64> {
         call.ask(tree, rays, &mut answers);
         assert!(answers == expected, "{}: another answer", tree.isa());
     }
-    let turns = measure(trees.len(), ROUNDS, |engine| {
+    let turns = measure_chunks(trees.len(), ROUNDS, 1, Clock::ThreadCpu, |engine, _| {
         call.ask(&trees[engine], rays, &mut answers);
         std::hint::black_box(&mut answers);
     });
-    turns.speed.iter().map(|speed| speed.median).collect()
+    turns.speed.iter().map(|speed| speed.quartiles[1]).collect()
 }

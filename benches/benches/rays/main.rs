@@ -18,7 +18,7 @@ use raywright_tracer::{World, generate};
 const ROUNDS: usize = 9;
 
 /// Side of the picture whose rays every kernel is asked about.
-const KERNEL_SIDE: u32 = 64;
+const KERNEL_SIDE: u32 = 128;
 
 /// Something that is asked with rays.
 struct Engine {
