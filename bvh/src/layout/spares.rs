@@ -16,6 +16,7 @@ use super::{
     node::Node,
     triangles::{CornerBlock, EdgeBlock, IndexBlock},
 };
+use crate::simd::pages::ask_for_large_pages;
 
 /// So many builds may pass by a vector before it is freed: more than the rows of a comparison that
 /// builds them in turns.
@@ -120,6 +121,7 @@ impl Spares {
             // Freed first, so that there are never both.
             memory = vec![];
             memory.reserve_exact(len);
+            ask_for_large_pages(memory.spare_capacity_mut());
         }
         memory
     }

@@ -18,7 +18,7 @@ use std::arch::x86_64::{
 };
 
 use super::{
-    Lanes, PushChildren,
+    Lanes, PushChildren, last_child,
     portable::{Half, Halves},
     stack::Stack,
 };
@@ -190,13 +190,19 @@ lanes_by_intrinsics!(
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<'_, 8>) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; 8],
+        order: u64,
+        stack: &mut Stack<'_, 8>,
+    ) -> u32 {
         // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
-        let (slots, children) = unsafe {
-            let fields = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
-            let order = _mm256_set1_epi32(order as u32 as i32);
+        let (slots, words) = unsafe {
+            let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
+            let fields = _mm256_set1_epi32(order as u32 as i32);
             (
-                _mm256_and_si256(_mm256_srlv_epi32(order, fields), _mm256_set1_epi32(7)),
+                _mm256_and_si256(_mm256_srlv_epi32(fields, shifts), _mm256_set1_epi32(7)),
                 _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()),
             )
         };
@@ -205,11 +211,12 @@ lanes_by_intrinsics!(
         let (references, distances) = unsafe {
             let slots = _mm256_permutevar8x32_epi32(slots, closing(sorted));
             (
-                _mm256_permutevar8x32_epi32(children, slots),
+                _mm256_permutevar8x32_epi32(words, slots),
                 _mm256_permutevar8x32_ps(self.0, slots),
             )
         };
         push_eight(stack, references, distances, mask.count_ones());
+        last_child(sorted, children, order)
     }
 );
 
@@ -221,7 +228,8 @@ impl Half for F32x8 {
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16>,
-    ) {
+    ) -> u32 {
+        let mut entered = 0;
         for half in 0..2 {
             // SAFETY: AVX2 is available (file header). The loads read eight words each of the
             // sixteen of `children`.
@@ -258,7 +266,9 @@ impl Half for F32x8 {
                 )
             };
             push_eight(stack, references, distances, sorted.count_ones());
+            entered |= sorted << (8 * half);
         }
+        last_child(entered, children, order)
     }
 }
 

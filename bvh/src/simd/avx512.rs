@@ -27,7 +27,7 @@ use std::arch::x86_64::{
     _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_xor_ps,
 };
 
-use super::{Lanes, PushChildren, avx2::lanes_by_intrinsics, stack::Stack};
+use super::{Lanes, PushChildren, avx2::lanes_by_intrinsics, last_child, stack::Stack};
 
 /// Four lanes in a register of 128 bits.
 #[derive(Clone, Copy, Debug)]
@@ -75,21 +75,28 @@ lanes_by_intrinsics!(
     _mm_movemask_ps,
     /// Sorts by one permutation and closes the gaps by compression, without a branch.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 4], order: u64, stack: &mut Stack<'_, 4>) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; 4],
+        order: u64,
+        stack: &mut Stack<'_, 4>,
+    ) -> u32 {
         let (reference, distance) = stack.top(4);
         // SAFETY: the instructions are available (file header). The load reads the four words of
         // `children`. By the invariant of the stack, N = 4 entries from the top on lie inside each
         // array; all four are written, and at most four are counted in.
         unsafe {
-            let order = _mm_set1_epi32(order as u32 as i32);
-            let slots = _mm_srlv_epi32(order, _mm_setr_epi32(0, 2, 4, 6));
+            let fields = _mm_set1_epi32(order as u32 as i32);
+            let slots = _mm_srlv_epi32(fields, _mm_setr_epi32(0, 2, 4, 6));
             let bits = _mm_sllv_epi32(_mm_set1_epi32(1), _mm_and_si128(slots, _mm_set1_epi32(3)));
             let entered = _mm_test_epi32_mask(bits, _mm_set1_epi32(mask as i32));
             let slots = _mm_maskz_compress_epi32(entered, slots);
-            let children = _mm_loadu_ps(children.as_ptr().cast::<f32>());
-            _mm_storeu_ps(reference.cast::<f32>(), _mm_permutevar_ps(children, slots));
+            let words = _mm_loadu_ps(children.as_ptr().cast::<f32>());
+            _mm_storeu_ps(reference.cast::<f32>(), _mm_permutevar_ps(words, slots));
             _mm_storeu_ps(distance, _mm_permutevar_ps(self.0, slots));
             stack.grow(mask.count_ones());
+            last_child(u32::from(entered), children, order)
         }
     }
 );
@@ -116,21 +123,28 @@ lanes_by_intrinsics!(
     _cvtmask8_u32,
     /// As with four lanes.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 8], order: u64, stack: &mut Stack<'_, 8>) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; 8],
+        order: u64,
+        stack: &mut Stack<'_, 8>,
+    ) -> u32 {
         let (reference, distance) = stack.top(8);
         // SAFETY: as with four lanes, for eight.
         unsafe {
-            let order = _mm256_set1_epi32(order as u32 as i32);
-            let slots = _mm256_srlv_epi32(order, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
+            let fields = _mm256_set1_epi32(order as u32 as i32);
+            let slots = _mm256_srlv_epi32(fields, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
             let lanes = _mm256_and_si256(slots, _mm256_set1_epi32(7));
             let bits = _mm256_sllv_epi32(_mm256_set1_epi32(1), lanes);
             let entered = _mm256_test_epi32_mask(bits, _mm256_set1_epi32(mask as i32));
             let slots = _mm256_maskz_compress_epi32(entered, slots);
-            let children = _mm256_loadu_ps(children.as_ptr().cast::<f32>());
-            let children = _mm256_permutevar8x32_ps(children, slots);
-            _mm256_storeu_ps(reference.cast::<f32>(), children);
+            let words = _mm256_loadu_ps(children.as_ptr().cast::<f32>());
+            let words = _mm256_permutevar8x32_ps(words, slots);
+            _mm256_storeu_ps(reference.cast::<f32>(), words);
             _mm256_storeu_ps(distance, _mm256_permutevar8x32_ps(self.0, slots));
             stack.grow(mask.count_ones());
+            last_child(u32::from(entered), children, order)
         }
     }
 );
@@ -157,24 +171,31 @@ lanes_by_intrinsics!(
     _cvtmask16_u32,
     /// As with four lanes; the upper eight slots are in the upper half of `order`.
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<'_, 16>) {
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; 16],
+        order: u64,
+        stack: &mut Stack<'_, 16>,
+    ) -> u32 {
         let (reference, distance) = stack.top(16);
         // SAFETY: as with four lanes, for sixteen.
         unsafe {
-            let fields =
+            let shifts =
                 _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
             let low = _mm512_set1_epi32(order as u32 as i32);
-            let order = _mm512_mask_set1_epi32(low, 0xff00, (order >> 32) as i32);
-            let slots = _mm512_srlv_epi32(order, fields);
+            let fields = _mm512_mask_set1_epi32(low, 0xff00, (order >> 32) as i32);
+            let slots = _mm512_srlv_epi32(fields, shifts);
             let lanes = _mm512_and_si512(slots, _mm512_set1_epi32(15));
             let bits = _mm512_sllv_epi32(_mm512_set1_epi32(1), lanes);
             let entered = _mm512_test_epi32_mask(bits, _mm512_set1_epi32(mask as i32));
             let slots = _mm512_maskz_compress_epi32(entered, slots);
-            let children = _mm512_loadu_ps(children.as_ptr().cast::<f32>());
-            let children = _mm512_permutexvar_ps(slots, children);
-            _mm512_storeu_ps(reference.cast::<f32>(), children);
+            let words = _mm512_loadu_ps(children.as_ptr().cast::<f32>());
+            let words = _mm512_permutexvar_ps(slots, words);
+            _mm512_storeu_ps(reference.cast::<f32>(), words);
             _mm512_storeu_ps(distance, _mm512_permutexvar_ps(slots, self.0));
             stack.grow(mask.count_ones());
+            last_child(u32::from(entered), children, order)
         }
     }
 );

@@ -17,6 +17,7 @@ pub(crate) mod build;
 pub(crate) mod dispatch;
 pub(crate) mod gather;
 pub(crate) mod isa;
+pub(crate) mod pages;
 pub(crate) mod portable;
 pub(crate) mod stack;
 
@@ -64,7 +65,8 @@ pub trait Lanes<const N: usize>: Copy {
 pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
     /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
     /// `self`, in the order of the child numbers that `order` holds in fields of
-    /// `log2(N)` bits, lowest field first.
+    /// `log2(N)` bits, lowest field first; returns the last of them, which is on top then. To take
+    /// it from there would mean to wait for the store. Unspecified if `mask` is 0.
     #[inline(always)]
     fn push_children(
         self,
@@ -72,14 +74,24 @@ pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
         children: &[u32; N],
         order: u64,
         stack: &mut stack::Stack<'_, N>,
-    ) {
+    ) -> u32 {
         let distances = self.store();
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
             let slot = (order >> (k * bits)) as usize & (N - 1);
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
+        stack.peek().unwrap_or(0)
     }
+}
+
+/// The child in the last place that `entered` has a bit of, the places being in the order of `order`.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn last_child<const N: usize>(entered: u32, children: &[u32; N], order: u64) -> u32 {
+    let place = entered.leading_zeros() ^ 31;
+    let slot = order >> (place * N.trailing_zeros() & 63);
+    children[slot as usize & (N - 1)]
 }
 
 /// Each of three values in every lane.

@@ -164,12 +164,13 @@ pub(crate) trait Half: PushChildren<8> {
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16>,
-    ) {
+    ) -> u32 {
         let distances = both.store();
         for k in 0..16 {
             let slot = (order >> (4 * k)) as usize & 15;
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
+        stack.peek().unwrap_or(0)
     }
 }
 
@@ -259,7 +260,13 @@ impl<L: Half> Lanes<16> for Halves<L> {
 
 impl<L: Half> PushChildren<16> for Halves<L> {
     #[inline(always)]
-    fn push_children(self, mask: u32, children: &[u32; 16], order: u64, stack: &mut Stack<'_, 16>) {
-        L::push_children_of_both(self, mask, children, order, stack);
+    fn push_children(
+        self,
+        mask: u32,
+        children: &[u32; 16],
+        order: u64,
+        stack: &mut Stack<'_, 16>,
+    ) -> u32 {
+        L::push_children_of_both(self, mask, children, order, stack)
     }
 }

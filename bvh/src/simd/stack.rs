@@ -13,7 +13,11 @@ use std::mem::MaybeUninit;
 pub(crate) const MAX_LEVELS: usize = 64;
 
 /// Room for the entries of a stack for nodes of `N` children. The arrays are used as flat ones.
+///
+/// Its alignment makes the compiler align the frame of a kernel: the vectors that it keeps there would otherwise lie
+/// across cache lines, as it decides where they go after it has decided about the frame.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(crate) struct StackMemory<const N: usize> {
     references: [[MaybeUninit<u32>; N]; MAX_LEVELS - 1],
     distances: [[MaybeUninit<f32>; N]; MAX_LEVELS - 1],
@@ -102,6 +106,12 @@ impl<'a, const N: usize> Stack<'a, N> {
     #[inline(always)]
     pub(super) unsafe fn grow(&mut self, count: u32) {
         self.top += count as usize;
+    }
+
+    /// Drops the top entry.
+    #[inline(always)]
+    pub(crate) fn drop_top(&mut self) {
+        self.top = self.top.saturating_sub(1);
     }
 
     /// The reference of the top entry.

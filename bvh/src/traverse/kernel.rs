@@ -13,6 +13,8 @@
 //! is always inlined, a closure may be compiled by itself, without the instruction set of the
 //! kernel, and then each operation becomes a call (seen: 7 times slower).
 
+use std::hint::black_box;
+
 use glam::Vec3;
 
 use super::triangle::{BlockHits, NODE_PAD, TriangleTest};
@@ -270,6 +272,33 @@ impl Watch for Filter<'_> {
     }
 }
 
+/// What the box test needs of a ray.
+pub(super) struct BoxRay {
+    reciprocal: [f32; 3],
+    near_addend: [f32; 3],
+    far_addend: [f32; 3],
+    t_min: f32,
+    near_plane: [usize; 3],
+}
+
+impl BoxRay {
+    #[inline(always)]
+    pub(super) fn new(ray: &RaySetup, margin: [f32; 3]) -> Self {
+        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
+        for axis in 0..3 {
+            [near_addend[axis], far_addend[axis]] = ray.addends(margin, axis);
+            near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
+        }
+        Self {
+            reciprocal: ray.reciprocal,
+            near_addend,
+            far_addend,
+            t_min: ray.t_min,
+            near_plane,
+        }
+    }
+}
+
 /// A ray in lanes of children.
 pub(super) struct BoxLanes<L> {
     reciprocal: [L; 3],
@@ -281,20 +310,15 @@ pub(super) struct BoxLanes<L> {
 
 impl<L> BoxLanes<L> {
     #[inline(always)]
-    pub(super) fn new<const N: usize>(ray: &RaySetup, margin: [f32; 3]) -> Self
+    pub(super) fn new<const N: usize>(ray: &BoxRay) -> Self
     where
         L: Lanes<N>,
     {
-        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
-        for axis in 0..3 {
-            [near_addend[axis], far_addend[axis]] = ray.addends(margin, axis);
-            near_plane[axis] = 2 * axis + (ray.octant >> axis & 1);
-        }
         Self {
             reciprocal: splat_all(ray.reciprocal),
-            near_addend: splat_all(near_addend),
-            far_addend: splat_all(far_addend),
-            near_plane,
+            near_addend: splat_all(ray.near_addend),
+            far_addend: splat_all(ray.far_addend),
+            near_plane: ray.near_plane,
             t_min: L::splat(ray.t_min),
         }
     }
@@ -335,35 +359,49 @@ impl<L> BoxLanes<L> {
     }
 }
 
-/// Follows a reference down to a leaf, the first child in order before the others, which wait on
-/// the stack. `None` if the ray enters no further box.
+/// Takes from the stack, and follows down, until a leaf is reached; the first child in order goes before the others,
+/// which wait on the stack. `None` when nothing is left.
 ///
 /// A node of which one child is entered (two of three are) is left without touching the stack:
 /// the way through memory is the longest part of a step.
+///
+/// The lanes of the ray are made anew after each leaf, from what the compiler takes for something new: it would
+/// otherwise keep them in memory, since the triangle test needs the registers, and load all of them at every node.
 #[inline(always)]
-fn descend<const N: usize, const W: usize, B, L: PushChildren<N>, O: Watch>(
+fn next_leaf<const ANY: bool, const N: usize, const W: usize, B, L: PushChildren<N>, O: Watch>(
     tree: &Tree<N, W, B>,
-    boxes: &BoxLanes<L>,
-    mut reference: ChildRef,
+    ray: &BoxRay,
+    octant: usize,
     t_max: f32,
-    order: impl Fn(&Node<N, W>) -> u64,
     stack: &mut Stack<'_, N>,
     watch: &mut O,
 ) -> Option<ChildRef> {
-    while !reference.is_leaf() {
-        watch.node();
-        let node = &tree.nodes[reference.0 as usize];
-        let (enter, mask) = boxes.test(node, t_max);
-        reference = if mask & mask.wrapping_sub(1) != 0 {
-            enter.push_children(mask, &node.children, order(node), stack);
-            ChildRef(stack.pop()?.0)
-        } else if mask != 0 {
-            ChildRef(node.children[mask.trailing_zeros() as usize & (N - 1)])
-        } else {
-            return None;
-        };
+    let boxes = BoxLanes::<L>::new(black_box(ray));
+    while let Some((reference, distance)) = stack.pop() {
+        if !ANY && distance > t_max {
+            continue;
+        }
+        let mut reference = ChildRef(reference);
+        loop {
+            if reference.is_leaf() {
+                return Some(reference);
+            }
+            watch.node();
+            let node = &tree.nodes[reference.0 as usize];
+            let (enter, mask) = boxes.test(node, t_max);
+            reference = if mask & mask.wrapping_sub(1) != 0 {
+                let order = order_of::<ANY, N, W>(node, octant);
+                let nearest = enter.push_children(mask, &node.children, order, stack);
+                stack.drop_top();
+                ChildRef(nearest)
+            } else if mask != 0 {
+                ChildRef(node.children[mask.trailing_zeros() as usize & (N - 1)])
+            } else {
+                break;
+            };
+        }
     }
-    Some(reference)
+    None
 }
 
 /// What `tell` makes of the closest hit, equal distances decided by the lowest id.
@@ -384,7 +422,7 @@ pub(crate) fn closest<
     tell: impl FnOnce(&Candidate, &RaySetup) -> H,
 ) -> Option<H> {
     let ray = &ray.setup()?;
-    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let boxes = BoxRay::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut best = Best::none(ray.t_max);
     let mut memory = StackMemory::new();
@@ -395,22 +433,9 @@ pub(crate) fn closest<
         ray.t_min,
     );
     // The loop of `follow` with all that changes in places of its own.
-    while let Some((reference, distance)) = stack.pop() {
-        if distance > best.t {
-            continue;
-        }
-        let order = |node: &Node<N, W>| node.order(ray.octant);
-        let Some(leaf) = descend(
-            tree,
-            &boxes,
-            ChildRef(reference),
-            best.t,
-            order,
-            &mut stack,
-            watch,
-        ) else {
-            continue;
-        };
+    while let Some(leaf) =
+        next_leaf::<false, N, W, B, L, O>(tree, &boxes, ray.octant, best.t, &mut stack, watch)
+    {
         for block in &tree.blocks[leaf.blocks()] {
             watch.block();
             let hits = A::test(ray, &prepared, block, &tree.points, best.t);
@@ -449,28 +474,15 @@ pub(super) fn follow<
 >(
     tree: &Tree<N, W, B>,
     ray: &RaySetup,
-    boxes: &BoxLanes<L>,
+    boxes: &BoxRay,
     prepared: &A::Ray<T>,
     stack: &mut Stack<'_, N>,
     best: &mut Best,
     watch: &mut O,
 ) {
-    while let Some((reference, distance)) = stack.pop() {
-        if distance > best.t {
-            continue;
-        }
-        let order = |node: &Node<N, W>| order_of::<ANY, N, W>(node, ray.octant);
-        let Some(leaf) = descend(
-            tree,
-            boxes,
-            ChildRef(reference),
-            best.t,
-            order,
-            stack,
-            watch,
-        ) else {
-            continue;
-        };
+    while let Some(leaf) =
+        next_leaf::<ANY, N, W, B, L, O>(tree, boxes, ray.octant, best.t, stack, watch)
+    {
         for block in &tree.blocks[leaf.blocks()] {
             watch.block();
             let hits = A::test(ray, prepared, block, &tree.points, best.t);
@@ -600,7 +612,7 @@ pub(crate) fn any<
     let Some(ray) = &ray.setup() else {
         return false;
     };
-    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let boxes = BoxRay::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut memory = StackMemory::new();
     let mut stack = Stack::<N>::new(&mut memory);
@@ -609,19 +621,9 @@ pub(crate) fn any<
         ChildRef::inner(0).0,
         ray.t_min,
     );
-    while let Some((reference, _)) = stack.pop() {
-        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
-        let Some(leaf) = descend(
-            tree,
-            &boxes,
-            ChildRef(reference),
-            ray.t_max,
-            order,
-            &mut stack,
-            watch,
-        ) else {
-            continue;
-        };
+    while let Some(leaf) =
+        next_leaf::<true, N, W, B, L, O>(tree, &boxes, ray.octant, ray.t_max, &mut stack, watch)
+    {
         for block in &tree.blocks[leaf.blocks()] {
             watch.block();
             let hits = A::test(ray, &prepared, block, &tree.points, ray.t_max);
@@ -655,7 +657,7 @@ pub(crate) fn all<
     ray: &RaySetup,
     mut visit: impl FnMut(Candidate),
 ) {
-    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let boxes = BoxRay::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut memory = StackMemory::new();
     let mut stack = Stack::<N>::new(&mut memory);
@@ -664,19 +666,9 @@ pub(crate) fn all<
         ChildRef::inner(0).0,
         ray.t_min,
     );
-    while let Some((reference, _)) = stack.pop() {
-        let order = |_: &Node<N, W>| Node::<N, W>::SLOT_ORDER;
-        let Some(leaf) = descend(
-            tree,
-            &boxes,
-            ChildRef(reference),
-            ray.t_max,
-            order,
-            &mut stack,
-            &mut (),
-        ) else {
-            continue;
-        };
+    while let Some(leaf) =
+        next_leaf::<true, N, W, B, L, ()>(tree, &boxes, ray.octant, ray.t_max, &mut stack, &mut ())
+    {
         for block in &tree.blocks[leaf.blocks()] {
             let hits = A::test(ray, &prepared, block, &tree.points, ray.t_max);
             let mut lanes = hits.mask;
@@ -720,7 +712,7 @@ pub(crate) fn visit<
     ray: &RaySetup,
     meet: &mut dyn FnMut(&Candidate) -> f32,
 ) {
-    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+    let boxes = BoxRay::new(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut t_max = ray.t_max;
     let mut memory = StackMemory::new();
@@ -730,22 +722,9 @@ pub(crate) fn visit<
         ChildRef::inner(0).0,
         ray.t_min,
     );
-    while let Some((reference, distance)) = stack.pop() {
-        if distance > t_max {
-            continue;
-        }
-        let order = |node: &Node<N, W>| node.order(ray.octant);
-        let Some(leaf) = descend(
-            tree,
-            &boxes,
-            ChildRef(reference),
-            t_max,
-            order,
-            &mut stack,
-            &mut (),
-        ) else {
-            continue;
-        };
+    while let Some(leaf) =
+        next_leaf::<false, N, W, B, L, ()>(tree, &boxes, ray.octant, t_max, &mut stack, &mut ())
+    {
         for block in &tree.blocks[leaf.blocks()] {
             let hits = A::test(ray, &prepared, block, &tree.points, t_max);
             let mut lanes = hits.mask;

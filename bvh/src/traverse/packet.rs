@@ -9,7 +9,7 @@
 //! that answers are those of one ray at a time to the last bit.
 
 use super::{
-    kernel::{Best, BoxLanes, Candidate, RaySetup, follow, order_of},
+    kernel::{Best, BoxRay, Candidate, RaySetup, follow, order_of},
     triangle::{NODE_PAD, TriangleTest},
 };
 use crate::{
@@ -203,7 +203,7 @@ impl<const N: usize, P> Packets<N, P> {
         L: PushChildren<N>,
         T: Lanes<4>,
     {
-        let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+        let boxes = BoxRay::new(ray, A::margin(ray));
         let mut best = Best::none(ray.t_max);
         let mut stack = Stack::new(&mut self.memory);
         stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
@@ -317,7 +317,7 @@ impl<const N: usize, P> Packets<N, P> {
                         }
                     }
                 } else {
-                    let boxes = BoxLanes::<L>::new(ray, A::margin(ray));
+                    let boxes = BoxRay::new(ray, A::margin(ray));
                     let mut stack = Stack::new(&mut self.memory);
                     stack.push_if(1, reference.0, enter[lane]);
                     follow::<ANY, N, W, B, A, L, T, ()>(

@@ -8,7 +8,7 @@
 //! bit, however many are in flight and in whatever order they come.
 
 use super::{
-    kernel::{Best, BoxLanes, Candidate, RaySetup, order_of},
+    kernel::{Best, BoxLanes, BoxRay, Candidate, RaySetup, order_of},
     packet::{PACKET_SIZE, Packets, go_side_by_side},
     triangle::TriangleTest,
 };
@@ -101,7 +101,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         start(&mut waiting, ray.t_min);
         Self {
             place,
-            boxes: BoxLanes::new(&ray, A::margin(&ray)),
+            boxes: BoxLanes::new(&BoxRay::new(&ray, A::margin(&ray))),
             prepared: A::prepare::<T>(&ray),
             best: Best::none(ray.t_max),
             waiting,
@@ -117,7 +117,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         T: Lanes<4>,
     {
         self.place = place;
-        self.boxes = BoxLanes::new(&ray, A::margin(&ray));
+        self.boxes = BoxLanes::new(&BoxRay::new(&ray, A::margin(&ray)));
         self.prepared = A::prepare::<T>(&ray);
         self.best = Best::none(ray.t_max);
         start(&mut self.waiting, ray.t_min);
