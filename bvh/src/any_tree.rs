@@ -18,8 +18,9 @@ use crate::{
     stats::{TreeStats, sah_cost},
     traverse::{
         fast::Fast,
-        kernel::{Asked, Candidate, RaySetup, Watch},
+        kernel::{Candidate, Watch},
         robust::Robust,
+        setup::{Asked, RaySetup},
         stream::{Together, Waiting},
     },
 };

@@ -26,7 +26,8 @@ use crate::{
     stats::TreeStats,
     traverse::{
         box_test::BoxTest,
-        kernel::{Candidate, RaySetup, Unprepared},
+        kernel::Candidate,
+        setup::{RaySetup, Unprepared},
     },
 };
 

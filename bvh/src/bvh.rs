@@ -21,7 +21,8 @@ use crate::{
     simd::Isa,
     stats::TreeStats,
     traverse::{
-        kernel::{Asked, Candidate, Filter, RaySetup, Unprepared, Watch, power_of_two_below},
+        kernel::{Candidate, Filter, Watch},
+        setup::{Asked, RaySetup, Unprepared, power_of_two_below},
         stream::{self, Together, Waiting},
     },
 };

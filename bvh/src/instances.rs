@@ -39,7 +39,8 @@ use glam::{Affine3, DMat3, DVec3};
 use crate::{
     Aabb, BoxBvh, BuildParams, BuildWorkspace, Bvh, Hit, InstanceError, Isa, Ray, TreeStats,
     traverse::{
-        kernel::{Candidate, RaySetup, precedes},
+        kernel::{Candidate, precedes},
+        setup::RaySetup,
         triangle::UNIT_ROUNDOFF,
     },
 };

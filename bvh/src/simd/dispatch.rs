@@ -13,7 +13,8 @@ use super::{avx2, avx512};
 use crate::{
     layout::{block::Block, tree::Tree},
     traverse::{
-        kernel::{self, Asked, Candidate, RaySetup, Watch},
+        kernel::{self, Candidate, Watch},
+        setup::{Asked, RaySetup},
         stream::{self, Together, Waiting},
         triangle::TriangleTest,
     },

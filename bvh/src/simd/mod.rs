@@ -90,7 +90,7 @@ pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
 #[inline(always)]
 fn last_child<const N: usize>(entered: u32, children: &[u32; N], order: u64) -> u32 {
     let place = entered.leading_zeros() ^ 31;
-    let slot = order >> (place * N.trailing_zeros() & 63);
+    let slot = order >> ((place * N.trailing_zeros()) & 63);
     children[slot as usize & (N - 1)]
 }
 

@@ -10,7 +10,7 @@
 //! acts as 2⁻⁶⁰: a ray in a face's plane, or nearer to it than 8·u·m, is inside.
 
 use super::{
-    kernel::RaySetup,
+    setup::RaySetup,
     triangle::{BlockHits, TRIANGLE_PAD, TriangleTest},
 };
 use crate::{

@@ -9,7 +9,7 @@
 //! 7.3·u·m·|r| of the triangle's computed box, below [`TRIANGLE_PAD`]: no true hit is moved.
 
 use super::{
-    kernel::RaySetup,
+    setup::RaySetup,
     triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
 };
 use crate::{

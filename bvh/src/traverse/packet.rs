@@ -9,7 +9,9 @@
 //! that answers are those of one ray at a time to the last bit.
 
 use super::{
-    kernel::{Best, BoxRay, Candidate, RaySetup, follow, order_of},
+    kernel::{Best, Candidate, follow, order_of},
+    node_test::BoxRay,
+    setup::RaySetup,
     triangle::{NODE_PAD, TriangleTest},
 };
 use crate::{

@@ -4,8 +4,9 @@
 use glam::Vec3;
 
 use super::{
-    kernel::{Candidate, RaySetup, precedes},
+    kernel::{Candidate, precedes},
     robust::{SMALL_EDGE_VALUE, axes_of, in_f64, margin_of},
+    setup::RaySetup,
     triangle::UNIT_ROUNDOFF,
 };
 use crate::{

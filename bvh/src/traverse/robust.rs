@@ -21,7 +21,7 @@
 //! origins nearer than 2³⁶ sizes of the scene.)
 
 use super::{
-    kernel::RaySetup,
+    setup::RaySetup,
     triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
 };
 use crate::{

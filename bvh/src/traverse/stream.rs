@@ -8,8 +8,10 @@
 //! bit, however many are in flight and in whatever order they come.
 
 use super::{
-    kernel::{Best, BoxLanes, BoxRay, Candidate, RaySetup, order_of},
+    kernel::{Best, Candidate, order_of},
+    node_test::{BoxLanes, BoxRay},
     packet::{PACKET_SIZE, Packets, go_side_by_side},
+    setup::RaySetup,
     triangle::TriangleTest,
 };
 use crate::{

@@ -23,7 +23,7 @@
 //! to about 2·u·m·|r|; a ray in the plane of a triangle, for which all that the test computes is
 //! noise, can be accepted by the test and enter none of the parts.
 
-use super::kernel::RaySetup;
+use super::setup::RaySetup;
 use crate::{layout::block::Point, simd::Lanes};
 
 /// Half an ulp of 1: the unit roundoff of f32.
