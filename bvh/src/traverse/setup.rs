@@ -56,7 +56,12 @@ impl RaySetup {
             return None;
         }
         let [direction_scale, lift] = direction_scale(largest);
-        let direction = ray.direction * lift * direction_scale;
+        // Both are 1 or neither is.
+        let direction = if direction_scale == 1.0 {
+            ray.direction
+        } else {
+            ray.direction * lift * direction_scale
+        };
         let reciprocal = direction.to_array().map(|d| {
             if d.abs() < SMALLEST_COMPONENT {
                 SMALLEST_COMPONENT.copysign(d)
@@ -85,9 +90,8 @@ impl RaySetup {
             margin,
             t_min: scaled_by(t_min),
             t_max: scaled_by(ray.t_max),
-            octant: (0..3)
-                .map(|axis| usize::from(reciprocal[axis] < 0.0) << axis)
-                .sum(),
+            // The signs are those of the reciprocals, but known before these are.
+            octant: ray.direction.is_negative_bitmask() as usize,
             unscale,
         })
     }
