@@ -5,6 +5,8 @@
 //! and `avx512` are the implementations; `dispatch` enters one kernel per instruction set,
 //! chosen once by [`Isa`].
 //!
+//! Beside them stand what else a kernel needs and safe Rust does not have: the `stack`, prefetching, large `pages`.
+//!
 //! Invariant: the operations of [`Lanes`] other than [`Lanes::mul_add`] round once each in the
 //! same way in every implementation, so that a triangle test gives the same bits everywhere.
 //! `mul_add` may round once or twice and is for box tests alone, which are conservative.

@@ -5,7 +5,7 @@
 use std::mem::MaybeUninit;
 
 /// Asks the system to back memory by large pages, as far as it covers them. What that does depends on the system:
-/// nothing at worst, and nothing on others than Linux.
+/// it may do nothing, and does on others than Linux.
 pub(crate) fn ask_for_large_pages<T>(memory: &mut [MaybeUninit<T>]) {
     #[cfg(target_os = "linux")]
     {
@@ -29,3 +29,24 @@ pub(crate) fn ask_for_large_pages<T>(memory: &mut [MaybeUninit<T>]) {
 /// Bytes of the large pages of most systems: smaller memory has no use for the advice.
 #[cfg(target_os = "linux")]
 const LARGE_PAGE: usize = 2 << 20;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_in_memory_stays() {
+        for (len, skipped) in [(0, 0), (1000, 1), (1 << 20, 0), (1 << 20, 12_345)] {
+            let mut memory: Vec<_> = (0..len as u64).map(MaybeUninit::new).collect();
+            ask_for_large_pages(&mut memory[skipped..]);
+            for (number, item) in memory.iter_mut().enumerate() {
+                item.write(number as u64 + 1);
+            }
+            ask_for_large_pages(&mut memory[skipped..]);
+            assert!((1..=len as u64).eq(memory.iter().map(|item| {
+                // SAFETY: all were written.
+                unsafe { item.assume_init() }
+            })));
+        }
+    }
+}
