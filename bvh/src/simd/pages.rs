@@ -9,7 +9,6 @@ use std::mem::MaybeUninit;
 pub(crate) fn ask_for_large_pages<T>(memory: &mut [MaybeUninit<T>]) {
     #[cfg(target_os = "linux")]
     {
-        use rustix::mm::{Advice, madvise};
         /// Advice is given for whole pages; this many bytes are a whole number of them on all systems.
         const PAGE: usize = 1 << 16;
         let first = memory.as_mut_ptr().cast::<u8>();
@@ -20,7 +19,7 @@ pub(crate) fn ask_for_large_pages<T>(memory: &mut [MaybeUninit<T>]) {
         }
         // SAFETY: the range lies within `memory`; this advice changes neither what is in it nor who may use it.
         // The system may refuse, and then pages stay as they are.
-        let _ = unsafe { madvise(first.wrapping_add(gap).cast(), len, Advice::LinuxHugepage) };
+        let _ = unsafe { libc::madvise(first.wrapping_add(gap).cast(), len, libc::MADV_HUGEPAGE) };
     }
     #[cfg(not(target_os = "linux"))]
     let _ = memory;
