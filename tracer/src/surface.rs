@@ -4,7 +4,8 @@
 //! so that it lies within half an ulp per coordinate of the triangle's plane; a ray starts beyond
 //! the error that is left (after the bounds of Pharr, Jakob, Humphreys, *Physically Based
 //! Rendering*, 4th ed., 2023, section 6.8). Invariant: a ray that leaves a triangle on one side
-//! does not hit it again.
+//! does not hit it again by the fast test. The bound is that of N · (v0 − o); the robust test finds
+//! distances otherwise, and up to 2e-3 of diffuse rays were seen to hit what they leave.
 
 use raywright_bvh::{Hit, Ray, TriangleMesh, Vec3};
 
