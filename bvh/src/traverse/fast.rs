@@ -10,7 +10,7 @@
 
 use super::{
     setup::RaySetup,
-    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
+    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval, cross, dot, sub},
 };
 use crate::{
     layout::{block::Point, triangles::WithEdges},
@@ -85,29 +85,4 @@ impl<B: WithEdges> TriangleTest<B> for Fast {
 #[inline(always)]
 fn add<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [a[0].add(b[0]), a[1].add(b[1]), a[2].add(b[2])]
-}
-
-#[inline(always)]
-fn sub<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
-    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
-}
-
-#[inline(always)]
-fn cross<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
-    [
-        determinant(a[1], a[2], b[1], b[2]),
-        determinant(a[2], a[0], b[2], b[0]),
-        determinant(a[0], a[1], b[0], b[1]),
-    ]
-}
-
-/// a·d − b·c.
-#[inline(always)]
-fn determinant<L: Lanes<4>>(a: L, b: L, c: L, d: L) -> L {
-    a.mul(d).sub(b.mul(c))
-}
-
-#[inline(always)]
-fn dot<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> L {
-    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }

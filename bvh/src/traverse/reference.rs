@@ -201,15 +201,20 @@ fn robust_triangle(ray: &RaySetup, corners: [Vec3; 3]) -> Option<(f32, f32, f32)
     if values.iter().any(|&value| value < 0.0) && values.iter().any(|&value| value > 0.0) {
         return None;
     }
-    let [t, weight_b, weight_c] = if values.iter().any(|v| v.abs() <= SMALL_EDGE_VALUE) {
-        in_f64(sheared, d[z])?
-    } else {
-        let [u, v, w] = values;
-        let den = u + v + w;
-        let (weight_b, weight_c) = (v / den, w / den);
-        let to = a[2] + weight_b * (b[2] - a[2]) + weight_c * (c[2] - a[2]);
-        [to / d[z], weight_b, weight_c]
-    };
+    let permuted = |v: Vec3| Vec3::new(v[x], v[y], v[z]);
+    let [v0, v1, v2] = corners.map(permuted);
+    let normal = cross(v2 - v0, v0 - v1);
+    let approach = dot(normal, permuted(Vec3::from(d)));
+    let [t, weight_b, weight_c] =
+        if approach == 0.0 || values.iter().any(|v| v.abs() <= SMALL_EDGE_VALUE) {
+            let corners = [v0, v1, v2].map(|v| v.to_array());
+            in_f64(ray, [x, y, z], corners, sheared)?
+        } else {
+            let [u, v, w] = values;
+            let den = u + v + w;
+            let to_plane = dot(normal, v0 - permuted(Vec3::from(ray.origin)));
+            [to_plane / approach, v / den, w / den]
+        };
     let t = in_box(ray, corners, margin_of(ray, z), t)?;
     Some((t, weight_b, weight_c))
 }

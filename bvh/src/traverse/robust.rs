@@ -10,19 +10,27 @@
 //! included. Only triangles seen exactly edge-on (all three values 0) are left out; the others
 //! around them cover the plane without them.
 //!
+//! The distance is that to the triangle's plane, found as `fast` finds it, from the corners as they
+//! are: what shearing rounds moves the point on the triangle by a few ulps of the origin, which along
+//! a ray at a flat angle is much, and a ray that starts beside a triangle would hit it. Where the ray
+//! is parallel to the plane, the distance is interpolated from the sheared corners.
+//!
 //! Why no such hit misses its own box: with u, m, r, S of `triangle`, d the direction, z its largest
 //! axis, M = m/|d| per axis. The sheared x of a vertex P − o is off by at most
 //! u·(2·m_x + 4·|d_x/d_z|·m_z). The weights with which the three computed vertices give (0, 0) make
 //! a point p of the triangle, and at the distance t of its z the ray is as far from p along x as
 //! that: within u·(2·M_x + 4·M_z) in distance. The computed distances to planes are off by 4·u·M
 //! with the pad. So the ray is inside the box at t if it is widened by u·(6·M_x + 4·M_z), and the
-//! margin here is M_x + M_z, of which [`TRIANGLE_PAD`] takes 8u. (A component of the direction
+//! margin here is M_x + M_z, of which [`TRIANGLE_PAD`] takes 8u. The distance to the plane is clamped
+//! to the interval of which this shows that it is not empty. (A component of the direction
 //! below 2⁻⁶⁰ acts as 2⁻⁶⁰ in box tests; what that moves, t·2⁻⁵⁹, is below the pad's 16u for
 //! origins nearer than 2³⁶ sizes of the scene.)
 
+use glam::DVec3;
+
 use super::{
     setup::RaySetup,
-    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval},
+    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval, cross, dot, sub},
 };
 use crate::{
     layout::{block::Point, triangles::WithCorners},
@@ -41,9 +49,9 @@ pub(crate) struct Robust;
 pub(crate) struct RobustRay<L> {
     axes: [usize; 3],
     origin: [L; 3],
+    direction: [L; 3],
     /// x/z and y/z of the direction.
     shear: [L; 2],
-    direction_z: f32,
     reciprocal: [f32; 3],
     pad: [f32; 3],
 }
@@ -84,8 +92,8 @@ impl<B: WithCorners> TriangleTest<B> for Robust {
         RobustRay {
             axes,
             origin: splat_all(axes.map(|axis| ray.origin[axis])),
+            direction: splat_all([x, y, z]),
             shear: [L::splat(x / z), L::splat(y / z)],
-            direction_z: z,
             reciprocal: axes.map(|axis| ray.reciprocal[axis]),
             pad: axes.map(|axis| margin[axis] * TRIANGLE_PAD),
         }
@@ -110,22 +118,21 @@ impl<B: WithCorners> TriangleTest<B> for Robust {
         if inside == 0 {
             return BlockHits::none();
         }
-        let den = u.add(v).add(w);
-        let (to_b, to_c) = (b[2].sub(a[2]), c[2].sub(a[2]));
-        let (weight_b, weight_c) = (v.div(den), w.div(den));
-        let z = a[2].add(weight_b.mul(to_b)).add(weight_c.mul(to_c));
-        let t = z.div(L::splat(prepared.direction_z));
+        let to_corner = sub(corners[0], prepared.origin);
+        let normal = cross(sub(corners[2], corners[0]), sub(corners[0], corners[1]));
+        let approach = dot(normal, prepared.direction);
         let mut hits = BlockHits {
             mask: inside,
-            t,
+            t: dot(normal, to_corner).div(approach),
             u: v,
             v: w,
-            den,
+            den: u.add(v).add(w),
         };
         let smallest = u.abs().min(v.abs()).min(w.abs());
-        let doubtful = inside & L::bits(smallest.le(L::splat(SMALL_EDGE_VALUE)));
+        let clear = L::bits(approach.is_nonzero());
+        let doubtful = inside & (L::bits(smallest.le(L::splat(SMALL_EDGE_VALUE))) | !clear);
         if doubtful != 0 {
-            decide([a, b, c], prepared.direction_z, doubtful, &mut hits);
+            decide(ray, prepared.axes, corners, [a, b, c], doubtful, &mut hits);
         }
         let (enter, leave) =
             box_interval(corners, prepared.origin, prepared.reciprocal, prepared.pad);
@@ -156,12 +163,14 @@ fn edge<L: Lanes<4>>(p: [L; 3], q: [L; 3]) -> L {
 #[cold]
 #[inline(always)]
 fn decide<L: Lanes<4>>(
+    ray: &RaySetup,
+    axes: [usize; 3],
     corners: [[L; 3]; 3],
-    direction_z: f32,
+    sheared: [[L; 3]; 3],
     mut doubtful: u32,
     hits: &mut BlockHits<L>,
 ) {
-    let corners = [store(corners[0]), store(corners[1]), store(corners[2])];
+    let [corners, sheared] = [corners, sheared].map(|corners| corners.map(store));
     let mut columns = [
         hits.t.store(),
         hits.u.store(),
@@ -171,7 +180,8 @@ fn decide<L: Lanes<4>>(
     while doubtful != 0 {
         let lane = doubtful.trailing_zeros() as usize & 3;
         doubtful &= doubtful - 1;
-        match in_f64(corners.map(|corner| corner.map(|x| x[lane])), direction_z) {
+        let of_lane = |corner: [[f32; 4]; 3]| corner.map(|row| row[lane]);
+        match in_f64(ray, axes, corners.map(of_lane), sheared.map(of_lane)) {
             Some([t, u, v]) => {
                 for (column, value) in columns.iter_mut().zip([t, u, v, 1.0]) {
                     column[lane] = value;
@@ -191,11 +201,17 @@ fn store<L: Lanes<4>>([x, y, z]: [L; 3]) -> [[f32; 4]; 3] {
     [x.store(), y.store(), z.store()]
 }
 
-/// Distance and weights of vertices 1 and 2, from sheared vertices, with edge values of exact sign.
+/// Distance and weights of vertices 1 and 2 in f64, with edge values of exact sign, from the corners
+/// and from what they are sheared to, both with their axes in the order `axes`.
 #[inline(never)]
-pub(crate) fn in_f64(corners: [[f32; 3]; 3], direction_z: f32) -> Option<[f32; 3]> {
-    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
-    let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+pub(crate) fn in_f64(
+    ray: &RaySetup,
+    axes: [usize; 3],
+    corners: [[f32; 3]; 3],
+    sheared: [[f32; 3]; 3],
+) -> Option<[f32; 3]> {
+    let [a, b, c] = sheared.map(|corner| DVec3::from(corner.map(f64::from)));
+    let edge = |p: DVec3, q: DVec3| p.x * q.y - p.y * q.x;
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
     let den = u + v + w;
     let mixed = u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0;
@@ -203,7 +219,16 @@ pub(crate) fn in_f64(corners: [[f32; 3]; 3], direction_z: f32) -> Option<[f32; 3
         return None;
     }
     let (weight_b, weight_c) = (v / den, w / den);
-    let z = a[2] + weight_b * (b[2] - a[2]) + weight_c * (c[2] - a[2]);
+    let [origin, direction] =
+        [ray.origin, ray.direction].map(|v| DVec3::from(axes.map(|axis| f64::from(v[axis]))));
+    let [p, q, r] = corners.map(|corner| DVec3::from(corner.map(f64::from)));
+    let normal = (r - p).cross(p - q);
+    let approach = normal.dot(direction);
+    let t = if approach == 0.0 {
+        (a.z + weight_b * (b.z - a.z) + weight_c * (c.z - a.z)) / direction.z
+    } else {
+        normal.dot(p - origin) / approach
+    };
     // Adding 0 makes a negative 0 a positive one.
-    Some([z / f64::from(direction_z), weight_b, weight_c].map(|x| x as f32 + 0.0))
+    Some([t, weight_b, weight_c].map(|x| x as f32 + 0.0))
 }

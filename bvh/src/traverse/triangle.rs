@@ -103,3 +103,28 @@ pub(crate) fn box_interval<L: Lanes<4>>(
     }
     (enter, leave)
 }
+
+#[inline(always)]
+pub(super) fn sub<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+
+#[inline(always)]
+pub(super) fn cross<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [
+        determinant(a[1], a[2], b[1], b[2]),
+        determinant(a[2], a[0], b[2], b[0]),
+        determinant(a[0], a[1], b[0], b[1]),
+    ]
+}
+
+/// a·d − b·c.
+#[inline(always)]
+fn determinant<L: Lanes<4>>(a: L, b: L, c: L, d: L) -> L {
+    a.mul(d).sub(b.mul(c))
+}
+
+#[inline(always)]
+pub(super) fn dot<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> L {
+    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
