@@ -244,6 +244,25 @@ impl Best {
         }
     }
 
+    /// Up to which distance hits are still of interest; with `ANY` none are after the first.
+    #[inline(always)]
+    pub(super) fn limit<const ANY: bool>(&self) -> f32 {
+        if ANY && self.is_hit() {
+            f32::NEG_INFINITY
+        } else {
+            self.t
+        }
+    }
+
+    /// Takes over a hit that precedes it.
+    #[inline(always)]
+    pub(super) fn keep_if_first(&mut self, Candidate { t, u, v, id }: Candidate) {
+        if precedes((t, id), (self.t, self.id)) {
+            let den = 1.0;
+            *self = Self { t, u, v, den, id };
+        }
+    }
+
     #[inline(always)]
     pub(super) fn is_hit(&self) -> bool {
         self.id != u32::MAX

@@ -12,7 +12,7 @@ use super::{
     kernel::{Best, Candidate, follow, order_of},
     node_test::BoxRay,
     setup::RaySetup,
-    triangle::{NODE_PAD, TriangleTest},
+    triangle::{NODE_PAD, TRIANGLE_PAD, TriangleTest},
 };
 use crate::{
     layout::{
@@ -31,7 +31,10 @@ use crate::{
 pub(crate) const PACKET_SIZE: usize = 16;
 
 /// So many rays are not worth their company.
-const TOO_FEW: u32 = 3;
+const TOO_FEW: u32 = 6;
+
+/// So many rays are tested with one triangle after the other, fewer one after the other with four triangles.
+const ENOUGH_FOR_A_TRIANGLE: u32 = 8;
 
 /// Whether all directions have the same signs.
 #[inline(always)]
@@ -57,20 +60,27 @@ struct Member<P> {
 type OfRays = [f32; PACKET_SIZE];
 
 /// The rays in lanes.
-struct RayLanes {
-    reciprocal: [OfRays; 3],
+pub(crate) struct PacketRays {
+    pub(super) origin: [OfRays; 3],
+    pub(super) direction: [OfRays; 3],
+    pub(super) reciprocal: [OfRays; 3],
     near_addend: [OfRays; 3],
     far_addend: [OfRays; 3],
-    t_min: OfRays,
-    /// Hits at or beyond are of no interest: −∞ for rays that need no more.
-    t_max: OfRays,
+    /// What widens the boxes of triangles.
+    pub(super) triangle_pad: [OfRays; 3],
+    pub(super) t_min: OfRays,
+    /// Hits beyond are of no interest: −∞ for rays that need no more.
+    pub(super) t_max: OfRays,
 }
 
-impl RayLanes {
+impl PacketRays {
     const NONE: Self = Self {
+        origin: [[0.0; PACKET_SIZE]; 3],
+        direction: [[0.0; PACKET_SIZE]; 3],
         reciprocal: [[0.0; PACKET_SIZE]; 3],
         near_addend: [[0.0; PACKET_SIZE]; 3],
         far_addend: [[0.0; PACKET_SIZE]; 3],
+        triangle_pad: [[0.0; PACKET_SIZE]; 3],
         t_min: [0.0; PACKET_SIZE],
         t_max: [f32::NEG_INFINITY; PACKET_SIZE],
     };
@@ -238,7 +248,7 @@ impl<const N: usize, P> Packets<N, P> {
         T: Lanes<4>,
         R: Lanes<PACKET_SIZE>,
     {
-        let mut lanes = RayLanes::NONE;
+        let mut lanes = PacketRays::NONE;
         self.members.clear();
         for (place, ray) in rays.iter().enumerate() {
             let Some(ray) = RaySetup::new(ray, scale) else {
@@ -248,7 +258,10 @@ impl<const N: usize, P> Packets<N, P> {
             let margin = A::margin(&ray);
             for axis in 0..3 {
                 let [near, far] = ray.addends(margin, axis);
+                lanes.origin[axis][lane] = ray.origin[axis];
+                lanes.direction[axis][lane] = ray.direction[axis];
                 lanes.reciprocal[axis][lane] = ray.reciprocal[axis];
+                lanes.triangle_pad[axis][lane] = margin[axis] * TRIANGLE_PAD;
                 lanes.near_addend[axis][lane] = near;
                 lanes.far_addend[axis][lane] = far;
             }
@@ -299,6 +312,13 @@ impl<const N: usize, P> Packets<N, P> {
                 }
                 continue;
             }
+            if rays.count_ones() >= ENOUGH_FOR_A_TRIANGLE
+                && reference.is_leaf()
+                && self.test_together::<ANY, W, B, A, T, R>(tree, reference, &mut lanes)
+            {
+                t_max = largest(&lanes.t_max);
+                continue;
+            }
             while rays != 0 {
                 let lane = rays.trailing_zeros() as usize & (PACKET_SIZE - 1);
                 rays &= rays - 1;
@@ -332,11 +352,7 @@ impl<const N: usize, P> Packets<N, P> {
                         &mut (),
                     );
                 }
-                lanes.t_max[lane] = if ANY && best.is_hit() {
-                    f32::NEG_INFINITY
-                } else {
-                    best.t
-                };
+                lanes.t_max[lane] = best.limit::<ANY>();
             }
             t_max = largest(&lanes.t_max);
         }
@@ -348,6 +364,41 @@ impl<const N: usize, P> Packets<N, P> {
                 tell(*place, &hit, ray);
             }
         }
+    }
+
+    /// Tests all rays with the triangles of a leaf, if the test can.
+    #[inline(always)]
+    fn test_together<const ANY: bool, const W: usize, B, A, T, R>(
+        &mut self,
+        tree: &Tree<N, W, B>,
+        leaf: ChildRef,
+        lanes: &mut PacketRays,
+    ) -> bool
+    where
+        B: Block,
+        A: TriangleTest<B, Ray<T> = P>,
+        T: Lanes<4>,
+        R: Lanes<PACKET_SIZE>,
+    {
+        for block in &tree.blocks[leaf.blocks()] {
+            let members = &mut self.members;
+            let hits = A::test_packet::<T, R>(lanes, block, &tree.points, |lane, hit| {
+                if let Some(member) = members.get_mut(lane) {
+                    member.best.keep_if_first(hit);
+                }
+            });
+            let Some(mut hits) = hits else {
+                return false;
+            };
+            while hits != 0 {
+                let lane = hits.trailing_zeros() as usize & (PACKET_SIZE - 1);
+                hits &= hits - 1;
+                if let Some(member) = self.members.get(lane) {
+                    lanes.t_max[lane] = member.best.limit::<ANY>();
+                }
+            }
+        }
+        true
     }
 }
 

@@ -30,7 +30,7 @@ use glam::DVec3;
 
 use super::{
     setup::RaySetup,
-    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval, cross, dot, sub},
+    triangle::{BlockHits, TRIANGLE_PAD, TriangleTest, box_interval, cross, dot, store, sub},
 };
 use crate::{
     layout::{block::Point, triangles::WithCorners},
@@ -134,8 +134,8 @@ impl<B: WithCorners> TriangleTest<B> for Robust {
         if doubtful != 0 {
             decide(ray, prepared.axes, corners, [a, b, c], doubtful, &mut hits);
         }
-        let (enter, leave) =
-            box_interval(corners, prepared.origin, prepared.reciprocal, prepared.pad);
+        let [reciprocal, pad] = [splat_all(prepared.reciprocal), splat_all(prepared.pad)];
+        let (enter, leave) = box_interval(corners, prepared.origin, reciprocal, pad);
         hits.t = hits.t.max(enter).min(leave);
         let in_box = enter.le(leave) & L::splat(ray.t_min).le(hits.t);
         hits.mask &= L::bits(in_box & hits.t.le(L::splat(t_max)));
@@ -194,11 +194,6 @@ fn decide<L: Lanes<4>>(
     hits.u = L::load(&columns[1]);
     hits.v = L::load(&columns[2]);
     hits.den = L::load(&columns[3]);
-}
-
-#[inline(always)]
-fn store<L: Lanes<4>>([x, y, z]: [L; 3]) -> [[f32; 4]; 3] {
-    [x.store(), y.store(), z.store()]
 }
 
 /// Distance and weights of vertices 1 and 2 in f64, with edge values of exact sign, from the corners

@@ -23,7 +23,11 @@
 //! to about 2·u·m·|r|; a ray in the plane of a triangle, for which all that the test computes is
 //! noise, can be accepted by the test and enter none of the parts.
 
-use super::setup::RaySetup;
+use super::{
+    kernel::Candidate,
+    packet::{PACKET_SIZE, PacketRays},
+    setup::RaySetup,
+};
 use crate::{layout::block::Point, simd::Lanes};
 
 /// Half an ulp of 1: the unit roundoff of f32.
@@ -54,6 +58,18 @@ pub(crate) trait TriangleTest<B> {
         points: &[Point],
         t_max: f32,
     ) -> BlockHits<L>;
+
+    /// Tests all rays of a packet with a block, a ray in a lane, and tells each hit, with the ray's lane. Returns the
+    /// rays that hit something, as bits; `None` if this test takes rays one by one only.
+    #[inline(always)]
+    fn test_packet<L: Lanes<4>, R: Lanes<PACKET_SIZE>>(
+        _: &PacketRays,
+        _: &B,
+        _: &[Point],
+        _: impl FnMut(usize, Candidate),
+    ) -> Option<u32> {
+        None
+    }
 }
 
 /// The lanes of a block that a ray hits, as bits, with distance and weights. The weights are still
@@ -83,34 +99,32 @@ impl<L: Lanes<4>> BlockHits<L> {
 /// Where the ray enters and leaves the boxes of the triangles, widened by `pad`. The axes may come
 /// in any order.
 #[inline(always)]
-pub(crate) fn box_interval<L: Lanes<4>>(
+pub(crate) fn box_interval<const N: usize, L: Lanes<N>>(
     [a, b, c]: [[L; 3]; 3],
     origin: [L; 3],
-    reciprocal: [f32; 3],
-    pad: [f32; 3],
+    reciprocal: [L; 3],
+    pad: [L; 3],
 ) -> (L, L) {
     let (mut enter, mut leave) = (L::splat(f32::NEG_INFINITY), L::splat(f32::INFINITY));
     for axis in 0..3 {
-        let pad = L::splat(pad[axis]);
-        let reciprocal = L::splat(reciprocal[axis]);
         let low = a[axis].min(b[axis]).min(c[axis]);
         let high = a[axis].max(b[axis]).max(c[axis]);
-        let low = low.sub(origin[axis]).mul(reciprocal);
-        let high = high.sub(origin[axis]).mul(reciprocal);
+        let low = low.sub(origin[axis]).mul(reciprocal[axis]);
+        let high = high.sub(origin[axis]).mul(reciprocal[axis]);
         // The sign of the direction swaps the planes; min and max of the two do the same.
-        enter = enter.max(low.min(high).sub(pad));
-        leave = leave.min(low.max(high).add(pad));
+        enter = enter.max(low.min(high).sub(pad[axis]));
+        leave = leave.min(low.max(high).add(pad[axis]));
     }
     (enter, leave)
 }
 
 #[inline(always)]
-pub(super) fn sub<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+pub(super) fn sub<const N: usize, L: Lanes<N>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
 }
 
 #[inline(always)]
-pub(super) fn cross<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+pub(super) fn cross<const N: usize, L: Lanes<N>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [
         determinant(a[1], a[2], b[1], b[2]),
         determinant(a[2], a[0], b[2], b[0]),
@@ -120,11 +134,16 @@ pub(super) fn cross<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 
 /// a·d − b·c.
 #[inline(always)]
-fn determinant<L: Lanes<4>>(a: L, b: L, c: L, d: L) -> L {
+fn determinant<const N: usize, L: Lanes<N>>(a: L, b: L, c: L, d: L) -> L {
     a.mul(d).sub(b.mul(c))
 }
 
 #[inline(always)]
-pub(super) fn dot<L: Lanes<4>>(a: [L; 3], b: [L; 3]) -> L {
+pub(super) fn dot<const N: usize, L: Lanes<N>>(a: [L; 3], b: [L; 3]) -> L {
     a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
+
+#[inline(always)]
+pub(super) fn store<L: Lanes<4>>([x, y, z]: [L; 3]) -> [[f32; 4]; 3] {
+    [x.store(), y.store(), z.store()]
 }
