@@ -97,13 +97,31 @@ fn check(
     Ok(hits)
 }
 
-/// Compares rays that are traced together with one at a time: rays of all directions, and the same sorted so that packets
-/// go side by side.
+/// Rays of one octant, which go side by side for a while, and as many that stay together down to the leaves.
+fn packets_of(rays: &[Ray]) -> Vec<Ray> {
+    const SIZE: usize = 16;
+    let in_octant = |ray: &Ray, step: f32| {
+        let mut ray = *ray;
+        ray.origin += Vec3::splat(step);
+        ray.direction = ray.direction.abs();
+        ray
+    };
+    let apart = rays
+        .iter()
+        .cycle()
+        .take(SIZE)
+        .map(|ray| in_octant(ray, 0.0));
+    let close = rays
+        .iter()
+        .take(4)
+        .flat_map(|ray| (0..SIZE).map(move |k| in_octant(ray, k as f32 / 1024.0)));
+    apart.chain(close).collect()
+}
+
+/// Compares rays that are traced together with one at a time: rays of all directions, and packets.
 fn check_streams(tree: &Bvh, rays: &[Ray]) -> Result<(), TestCaseError> {
     let (mut hits, mut are_hit) = (vec![], vec![]);
-    let mut sorted = rays.to_vec();
-    sorted.sort_by_key(|ray| ray.direction.to_array().map(f32::is_sign_negative));
-    for rays in [rays, &sorted] {
+    for rays in [rays, &packets_of(rays)] {
         let alone: Vec<_> = rays.iter().map(|ray| bits(tree.closest_hit(ray))).collect();
         let any_alone: Vec<_> = rays.iter().map(|ray| tree.any_hit(ray)).collect();
         for (in_flight, packets) in [

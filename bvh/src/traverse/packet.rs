@@ -1,7 +1,7 @@
 //! Traversal by sixteen rays that go side by side: the boxes of a node are first tested for all rays at once, by
 //! intervals of their origins and reciprocal directions (Boulos, Wald, Shirley, *Geometric and Arithmetic Culling
-//! Methods for Entire Ray Packets*, 2006), and those that some ray may enter for each ray, a ray in a lane. Where few
-//! rays are left together they go on one by one (Benthin, Wald, Woop, Ernst, Mattausch, Ernst, *Combining Single and
+//! Methods for Entire Ray Packets*, 2006), and those that some ray may enter for each ray, a ray in a lane; so are the
+//! triangles of a leaf, if the test can. Where few rays are left together they go on one by one (Benthin, Wald, Woop, Ernst, Mattausch, Ernst, *Combining Single and
 //! Packet-Ray Tracing for Arbitrary Ray Distributions on the Intel MIC Architecture*, 2012): rays that part cost
 //! little more than if they had never been together.
 //!
@@ -30,11 +30,9 @@ use crate::{
 /// How many rays go together.
 pub(crate) const PACKET_SIZE: usize = 16;
 
-/// So many rays are not worth their company.
+/// So many rays are not worth their company: each goes down alone, or is tested with four triangles at a time, which is
+/// about as much as testing all rays with one triangle after the other.
 const TOO_FEW: u32 = 6;
-
-/// So many rays are tested with one triangle after the other, fewer one after the other with four triangles.
-const ENOUGH_FOR_A_TRIANGLE: u32 = 8;
 
 /// Whether all directions have the same signs.
 #[inline(always)]
@@ -292,7 +290,8 @@ impl<const N: usize, P> Packets<N, P> {
         }) = self.waiting.pop()
         {
             let mut rays = rays & R::bits(R::load(&enter).le(R::load(&lanes.t_max)));
-            if rays.count_ones() > TOO_FEW && !reference.is_leaf() {
+            let together = rays.count_ones() > TOO_FEW;
+            if together && !reference.is_leaf() {
                 let node = &tree.nodes[reference.0 as usize];
                 let boxes = bundle.test(node, t_max);
                 let order = order_of::<ANY, N, W>(node, octant);
@@ -312,10 +311,7 @@ impl<const N: usize, P> Packets<N, P> {
                 }
                 continue;
             }
-            if rays.count_ones() >= ENOUGH_FOR_A_TRIANGLE
-                && reference.is_leaf()
-                && self.test_together::<ANY, W, B, A, T, R>(tree, reference, &mut lanes)
-            {
+            if together && self.test_together::<ANY, W, B, A, T, R>(tree, reference, &mut lanes) {
                 t_max = largest(&lanes.t_max);
                 continue;
             }
