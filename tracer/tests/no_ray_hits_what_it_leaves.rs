@@ -5,26 +5,16 @@
 use std::path::Path;
 
 use raywright_tracer::bvh::{Accuracy, BuildParams, Bvh, Ray, TriangleMesh, Vec3};
+use raywright_tracer::imaging::PixelSampler;
 use raywright_tracer::load::load_scene;
 use raywright_tracer::{Scene, Surface, generate};
 
-const RAYS: usize = 30_000;
+const RAYS: u32 = 30_000;
 
-/// Vectors of the cube -1..1 from a 64-bit Weyl sequence, mixed (SplitMix64).
-struct Vectors(u64);
-
-impl Vectors {
-    fn number(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u32 << 23) as f32 - 1.0
-    }
-
-    fn next(&mut self) -> Vec3 {
-        Vec3::from_array(std::array::from_fn(|_| self.number()))
-    }
+/// The vector of a number in the cube -1..1.
+fn vector(numbers: &PixelSampler, number: u32) -> Vec3 {
+    let component = |axis| numbers.uniform(3 * number + axis);
+    Vec3::new(component(0), component(1), component(2)) * 2.0 - 1.0
 }
 
 /// How many rays hit what they leave, and how many were sent.
@@ -38,16 +28,16 @@ fn self_hits(scene: &Scene, accuracy: Accuracy) -> [usize; 2] {
         bounds.min.midpoint(bounds.max),
         (bounds.max - bounds.min) * 0.5,
     );
-    let mut vectors = Vectors(1);
     let [mut found, mut sent] = [0; 2];
-    for _ in 0..RAYS {
-        let ray = Ray::new(centre + half * vectors.next(), vectors.next());
+    for ray in 0..RAYS {
+        let numbers = PixelSampler::new(1, 0, 0, ray);
+        let ray = Ray::new(centre + half * vector(&numbers, 0), vector(&numbers, 1));
         let Some(hit) = tree.closest_hit(&ray) else {
             continue;
         };
         let mesh = meshes[hit.geometry_id as usize];
         let surface = Surface::of_hit(mesh, &hit);
-        let any = vectors.next();
+        let any = vector(&numbers, 2);
         let flat = any.reject_from(surface.normal_towards(any)) + surface.normal * 1e-3;
         for direction in [any, flat] {
             let again = tree.closest_hit(&surface.ray_towards(direction));
@@ -63,7 +53,7 @@ fn self_hits(scene: &Scene, accuracy: Accuracy) -> [usize; 2] {
 fn check(name: &str, scene: &Scene) {
     for accuracy in [Accuracy::Fast, Accuracy::Robust] {
         let [found, sent] = self_hits(scene, accuracy);
-        assert!(sent > RAYS, "{name}: only {sent} rays");
+        assert!(sent > RAYS as usize, "{name}: only {sent} rays");
         assert_eq!(
             found, 0,
             "{name}, {accuracy:?}: of {sent} rays so many hit what they leave"
