@@ -462,6 +462,21 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         memory: &mut Memory,
         level: u32,
     ) -> Result<Record, BuildError> {
+        match self.children(&mut subtree, memory, level)? {
+            Some(base) => self.node(subtree, memory, base, level, Self::subtree),
+            None => self.leaf_phase(subtree, memory, level),
+        }
+    }
+
+    /// Divides a range into children, which are those of the memory from the place on that is returned; `None` if it is
+    /// to be leaves, for which it is sorted. Not inlined: what it needs on the stack, no level below has to wait for.
+    #[inline(never)]
+    fn children(
+        &self,
+        subtree: &mut Subtree<'_>,
+        memory: &mut Memory,
+        level: u32,
+    ) -> Result<Option<usize>, BuildError> {
         let (n, span) = (subtree.len, subtree.span());
         let (min_leaf_size, max_leaf_size) = (
             self.params.min_leaf_size as usize,
@@ -469,15 +484,15 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
         );
         if n <= min_leaf_size || self.is_at_limit(n, level) {
             subtree.sort::<R>(&span);
-            return self.leaf_phase(subtree, memory, level);
+            return Ok(None);
         }
-        let split = self.find_split(&subtree, &span, memory)?;
-        if n <= max_leaf_size && self.leaf_is_cheap(&subtree, split.as_ref()) {
+        let split = self.find_split(subtree, &span, memory)?;
+        if n <= max_leaf_size && self.leaf_is_cheap(subtree, split.as_ref()) {
             subtree.sort::<R>(&span);
-            return self.leaf_phase(subtree, memory, level);
+            return Ok(None);
         }
         let base = memory.lists.children.len();
-        let halves = self.divide(&mut subtree, span, split, &mut memory.lists.lefts);
+        let halves = self.divide(subtree, span, split, &mut memory.lists.lefts);
         memory.lists.children.extend(halves);
         while memory.lists.children.len() - base < self.params.branching_factor as usize {
             // The largest box first; ties keep the older child.
@@ -489,13 +504,13 @@ impl<R: Rounding, C: Fn(LeafReference) -> [Vec3; 3] + Sync> Builder<'_, R, C> {
                 break;
             };
             let child = memory.lists.children[largest];
-            let split = self.find_split(&subtree, &child, memory)?;
-            let [left, right] = self.divide(&mut subtree, child, split, &mut memory.lists.lefts);
+            let split = self.find_split(subtree, &child, memory)?;
+            let [left, right] = self.divide(subtree, child, split, &mut memory.lists.lefts);
             memory.lists.children[largest] = left;
             memory.lists.children.push(right);
         }
         memory.lists.children[base..].sort_by_key(|child| std::cmp::Reverse(child.len));
-        self.node(subtree, memory, base, level, Self::subtree)
+        Ok(Some(base))
     }
 
     /// Leaves, and halving without regard to cost where too many references are left. The

@@ -277,11 +277,7 @@ fn shrinking(findings: &mut Findings) -> Result<(), ExtremesError> {
 }
 
 /// Stack of a thread that builds, traces and drops.
-const STACK: usize = if cfg!(debug_assertions) {
-    256 << 10
-} else {
-    128 << 10
-};
+const STACK: usize = 128 << 10;
 
 /// T21. An overflow would end the process.
 pub(super) fn stack(_: &Settings, findings: &mut Findings) -> Result<(), ExtremesError> {
