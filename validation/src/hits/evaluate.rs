@@ -30,9 +30,9 @@ pub enum TriangleTestForm {
     MollerTrumbore,
     /// By triple products with the difference and the sum of the ends of each edge.
     EdgeSums,
-    /// By corners that are sheared such that the ray is an axis; so is the distance.
+    /// By corners that are sheared such that the ray is an axis, of which the distance is interpolated too.
     Sheared,
-    /// The same, but the distance is that to the plane of the corners as they are.
+    /// The same, but the distance is that to the plane of the corners before they are sheared.
     ShearedToPlane,
 }
 
@@ -204,7 +204,9 @@ fn distance(
     // A quotient in the last two places; that of the other tracer by a reciprocal and a step of Newton's.
     let quotient = match form {
         TriangleTestForm::EdgeSums => 6.0,
-        _ => 2.0,
+        TriangleTestForm::MollerTrumbore
+        | TriangleTestForm::Sheared
+        | TriangleTestForm::ShearedToPlane => 2.0,
     };
     let bound = bound + quotient * UNIT * t.abs();
     // Beyond what is certain: anything.
