@@ -18,7 +18,7 @@ use std::arch::x86_64::{
 };
 
 use super::{
-    Lanes, PushChildren, last_child,
+    Lanes, PushChildren, last_as_they_lie, last_child,
     portable::{Half, Halves},
     stack::Stack,
 };
@@ -190,13 +190,17 @@ lanes_by_intrinsics!(
     _mm256_movemask_ps,
     /// Sorts by one permutation and closes the gaps by another, without a branch.
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; 8],
         order: u64,
-        stack: &mut Stack<'_, 8>,
+        stack: &mut Stack<'_, 8, ANY>,
     ) -> u32 {
+        if ANY {
+            push_references(stack, mask, children);
+            return last_as_they_lie(mask, children);
+        }
         // SAFETY: AVX2 is available (file header). The load reads the eight words of `children`.
         let (slots, words) = unsafe {
             let shifts = _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21);
@@ -222,13 +226,19 @@ lanes_by_intrinsics!(
 
 impl Half for F32x8 {
     #[inline(always)]
-    fn push_children_of_both(
+    fn push_children_of_both<const ANY: bool>(
         both: Halves<Self>,
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<'_, 16>,
+        stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
+        if ANY {
+            let (halves, _) = children.as_chunks();
+            push_references(stack, mask & 255, &halves[0]);
+            push_references(stack, mask >> 8, &halves[1]);
+            return last_as_they_lie(mask, children);
+        }
         let mut entered = 0;
         for half in 0..2 {
             // SAFETY: AVX2 is available (file header). The loads read eight words each of the
@@ -293,10 +303,33 @@ fn closing(mask: u32) -> __m256i {
     unsafe { _mm256_loadu_si256(row.as_ptr().cast::<__m256i>()) }
 }
 
+/// Pushes those of eight references that `mask` has bits of, as they lie.
+#[inline(always)]
+fn push_references<const N: usize, const ANY: bool>(
+    stack: &mut Stack<'_, N, ANY>,
+    mask: u32,
+    references: &[u32; 8],
+) {
+    const {
+        assert!(
+            N >= 8,
+            "a push may write as many entries as a node has children"
+        )
+    };
+    let (reference, _) = stack.top(8);
+    // SAFETY: as in `push_eight`, of references alone; the load reads the eight of them.
+    unsafe {
+        let words = _mm256_loadu_si256(references.as_ptr().cast::<__m256i>());
+        let words = _mm256_permutevar8x32_epi32(words, closing(mask));
+        _mm256_storeu_si256(reference.cast::<__m256i>(), words);
+        stack.grow(mask.count_ones());
+    }
+}
+
 /// Pushes the first `count ≤ 8` of eight entries.
 #[inline(always)]
-pub(super) fn push_eight<const N: usize>(
-    stack: &mut Stack<'_, N>,
+fn push_eight<const N: usize, const ANY: bool>(
+    stack: &mut Stack<'_, N, ANY>,
     references: __m256i,
     distances: __m256,
     count: u32,

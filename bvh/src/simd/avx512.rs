@@ -13,21 +13,24 @@ use std::arch::x86_64::{
     __m128, __m256, __m512, __mmask8, __mmask16, _CMP_LE_OQ, _CMP_NEQ_OQ, _cvtmask8_u32,
     _cvtmask16_u32, _kand_mask8, _kand_mask16, _mm_add_ps, _mm_and_ps, _mm_and_si128,
     _mm_andnot_ps, _mm_cmp_ps, _mm_div_ps, _mm_fmadd_ps, _mm_loadu_ps, _mm_maskz_compress_epi32,
-    _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps, _mm_permutevar_ps, _mm_set1_epi32,
-    _mm_set1_ps, _mm_setr_epi32, _mm_sllv_epi32, _mm_srlv_epi32, _mm_storeu_ps, _mm_sub_ps,
-    _mm_test_epi32_mask, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm_maskz_compress_ps, _mm_max_ps, _mm_min_ps, _mm_movemask_ps, _mm_mul_ps, _mm_permutevar_ps,
+    _mm_set1_epi32, _mm_set1_ps, _mm_setr_epi32, _mm_sllv_epi32, _mm_srlv_epi32, _mm_storeu_ps,
+    _mm_sub_ps, _mm_test_epi32_mask, _mm_xor_ps, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
     _mm256_andnot_ps, _mm256_cmp_ps_mask, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps,
-    _mm256_maskz_compress_epi32, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps,
-    _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
+    _mm256_maskz_compress_epi32, _mm256_maskz_compress_ps, _mm256_max_ps, _mm256_min_ps,
+    _mm256_mul_ps, _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
     _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_sub_ps, _mm256_test_epi32_mask,
     _mm256_xor_ps, _mm512_add_ps, _mm512_and_ps, _mm512_and_si512, _mm512_andnot_ps,
     _mm512_cmp_ps_mask, _mm512_div_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_mask_set1_epi32,
-    _mm512_maskz_compress_epi32, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps,
-    _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setr_epi32, _mm512_sllv_epi32,
-    _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_sub_ps, _mm512_test_epi32_mask, _mm512_xor_ps,
+    _mm512_maskz_compress_epi32, _mm512_maskz_compress_ps, _mm512_max_ps, _mm512_min_ps,
+    _mm512_mul_ps, _mm512_permutexvar_ps, _mm512_set1_epi32, _mm512_set1_ps, _mm512_setr_epi32,
+    _mm512_sllv_epi32, _mm512_srlv_epi32, _mm512_storeu_ps, _mm512_sub_ps, _mm512_test_epi32_mask,
+    _mm512_xor_ps,
 };
 
-use super::{Lanes, PushChildren, avx2::lanes_by_intrinsics, last_child, stack::Stack};
+use super::{
+    Lanes, PushChildren, avx2::lanes_by_intrinsics, last_as_they_lie, last_child, stack::Stack,
+};
 
 /// Four lanes in a register of 128 bits.
 #[derive(Clone, Copy, Debug)]
@@ -75,18 +78,25 @@ lanes_by_intrinsics!(
     _mm_movemask_ps,
     /// Sorts by one permutation and closes the gaps by compression, without a branch.
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; 4],
         order: u64,
-        stack: &mut Stack<'_, 4>,
+        stack: &mut Stack<'_, 4, ANY>,
     ) -> u32 {
         let (reference, distance) = stack.top(4);
         // SAFETY: the instructions are available (file header). The load reads the four words of
         // `children`. By the invariant of the stack, N = 4 entries from the top on lie inside each
         // array; all four are written, and at most four are counted in.
         unsafe {
+            if ANY {
+                let words = _mm_loadu_ps(children.as_ptr().cast::<f32>());
+                let words = _mm_maskz_compress_ps(mask as u8, words);
+                _mm_storeu_ps(reference.cast::<f32>(), words);
+                stack.grow(mask.count_ones());
+                return last_as_they_lie(mask, children);
+            }
             let fields = _mm_set1_epi32(order as u32 as i32);
             let slots = _mm_srlv_epi32(fields, _mm_setr_epi32(0, 2, 4, 6));
             let bits = _mm_sllv_epi32(_mm_set1_epi32(1), _mm_and_si128(slots, _mm_set1_epi32(3)));
@@ -123,16 +133,23 @@ lanes_by_intrinsics!(
     _cvtmask8_u32,
     /// As with four lanes.
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; 8],
         order: u64,
-        stack: &mut Stack<'_, 8>,
+        stack: &mut Stack<'_, 8, ANY>,
     ) -> u32 {
         let (reference, distance) = stack.top(8);
         // SAFETY: as with four lanes, for eight.
         unsafe {
+            if ANY {
+                let words = _mm256_loadu_ps(children.as_ptr().cast::<f32>());
+                let words = _mm256_maskz_compress_ps(mask as u8, words);
+                _mm256_storeu_ps(reference.cast::<f32>(), words);
+                stack.grow(mask.count_ones());
+                return last_as_they_lie(mask, children);
+            }
             let fields = _mm256_set1_epi32(order as u32 as i32);
             let slots = _mm256_srlv_epi32(fields, _mm256_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21));
             let lanes = _mm256_and_si256(slots, _mm256_set1_epi32(7));
@@ -171,16 +188,23 @@ lanes_by_intrinsics!(
     _cvtmask16_u32,
     /// As with four lanes; the upper eight slots are in the upper half of `order`.
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<'_, 16>,
+        stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
         let (reference, distance) = stack.top(16);
         // SAFETY: as with four lanes, for sixteen.
         unsafe {
+            if ANY {
+                let words = _mm512_loadu_ps(children.as_ptr().cast::<f32>());
+                let words = _mm512_maskz_compress_ps(mask as u16, words);
+                _mm512_storeu_ps(reference.cast::<f32>(), words);
+                stack.grow(mask.count_ones());
+                return last_as_they_lie(mask, children);
+            }
             let shifts =
                 _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28);
             let low = _mm512_set1_epi32(order as u32 as i32);

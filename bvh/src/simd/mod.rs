@@ -68,19 +68,24 @@ pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
     /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
     /// `self`, in the order of the child numbers that `order` holds in fields of
     /// `log2(N)` bits, lowest field first; returns the last of them, which is on top then. To take
-    /// it from there would mean to wait for the store. Unspecified if `mask` is 0.
+    /// it from there would mean to wait for the store. With `ANY` they are pushed as they lie. Unspecified if `mask` is
+    /// 0.
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; N],
         order: u64,
-        stack: &mut stack::Stack<'_, N>,
+        stack: &mut stack::Stack<'_, N, ANY>,
     ) -> u32 {
         let distances = self.store();
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
-            let slot = (order >> (k * bits)) as usize & (N - 1);
+            let slot = if ANY {
+                k as usize
+            } else {
+                (order >> (k * bits)) as usize & (N - 1)
+            };
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
         stack.peek().unwrap_or(0)
@@ -94,6 +99,13 @@ fn last_child<const N: usize>(entered: u32, children: &[u32; N], order: u64) -> 
     let place = entered.leading_zeros() ^ 31;
     let slot = order >> ((place * N.trailing_zeros()) & 63);
     children[slot as usize & (N - 1)]
+}
+
+/// The last child that `entered` has a bit of.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn last_as_they_lie<const N: usize>(entered: u32, children: &[u32; N]) -> u32 {
+    children[(entered.leading_zeros() ^ 31) as usize & (N - 1)]
 }
 
 /// Each of three values in every lane.

@@ -158,16 +158,20 @@ pub(crate) struct Halves<L>(pub L, pub L);
 pub(crate) trait Half: PushChildren<8> {
     /// [`Lanes::push_children`] of both halves.
     #[inline(always)]
-    fn push_children_of_both(
+    fn push_children_of_both<const ANY: bool>(
         both: Halves<Self>,
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<'_, 16>,
+        stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
         let distances = both.store();
         for k in 0..16 {
-            let slot = (order >> (4 * k)) as usize & 15;
+            let slot = if ANY {
+                k
+            } else {
+                (order >> (4 * k)) as usize & 15
+            };
             stack.push_if((mask >> slot) & 1, children[slot], distances[slot]);
         }
         stack.peek().unwrap_or(0)
@@ -260,12 +264,12 @@ impl<L: Half> Lanes<16> for Halves<L> {
 
 impl<L: Half> PushChildren<16> for Halves<L> {
     #[inline(always)]
-    fn push_children(
+    fn push_children<const ANY: bool>(
         self,
         mask: u32,
         children: &[u32; 16],
         order: u64,
-        stack: &mut Stack<'_, 16>,
+        stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
         L::push_children_of_both(self, mask, children, order, stack)
     }

@@ -36,23 +36,16 @@ impl<const N: usize> StackMemory<N> {
     }
 }
 
-/// The stack for nodes of `N` children. It is apart from its memory, so that `top` stays in a register: next to arrays
-/// with computed places it would be stored and loaded again at every push and pop.
+/// The stack for nodes of `N` children; where `ANY` hit is sought, of references alone. It is apart from its memory, so
+/// that `top` stays in a register: next to arrays with computed places it would be stored and loaded again at every push
+/// and pop.
 #[derive(Debug)]
-pub(crate) struct Stack<'a, const N: usize> {
+pub(crate) struct Stack<'a, const N: usize, const ANY: bool> {
     memory: &'a mut StackMemory<N>,
     top: usize,
 }
 
-impl<'a, const N: usize> Stack<'a, N> {
-    const CAPACITY: usize = N * (MAX_LEVELS - 1);
-
-    /// An empty stack.
-    #[inline(always)]
-    pub(crate) fn new(memory: &'a mut StackMemory<N>) -> Self {
-        Self { memory, top: 0 }
-    }
-
+impl<'a, const N: usize> Stack<'a, N, false> {
     /// The stack that was left in `memory`.
     #[inline(always)]
     pub(crate) fn resume(memory: &'a mut StackMemory<N>) -> Self {
@@ -65,6 +58,16 @@ impl<'a, const N: usize> Stack<'a, N> {
     pub(crate) fn leave(self) {
         self.memory.left = self.top;
     }
+}
+
+impl<'a, const N: usize, const ANY: bool> Stack<'a, N, ANY> {
+    const CAPACITY: usize = N * (MAX_LEVELS - 1);
+
+    /// An empty stack.
+    #[inline(always)]
+    pub(crate) fn new(memory: &'a mut StackMemory<N>) -> Self {
+        Self { memory, top: 0 }
+    }
 
     /// Pushes an entry if `bit` is 1, without a branch; `bit` is 0 or 1.
     #[inline(always)]
@@ -73,7 +76,9 @@ impl<'a, const N: usize> Stack<'a, N> {
         // The index is in bounds by the invariant; min() lets the compiler see it for free.
         let at = self.top.min(Self::CAPACITY - 1);
         self.memory.references.as_flattened_mut()[at] = MaybeUninit::new(reference);
-        self.memory.distances.as_flattened_mut()[at] = MaybeUninit::new(distance);
+        if !ANY {
+            self.memory.distances.as_flattened_mut()[at] = MaybeUninit::new(distance);
+        }
         self.top += bit as usize;
     }
 
@@ -101,7 +106,7 @@ impl<'a, const N: usize> Stack<'a, N> {
     /// Counts in `count` entries that were written at [`Stack::top`].
     ///
     /// # Safety
-    /// So many entries of both arrays were initialised there.
+    /// So many entries of both arrays were initialised there, with `ANY` of the references.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(super) unsafe fn grow(&mut self, count: u32) {
@@ -130,13 +135,14 @@ impl<'a, const N: usize> Stack<'a, N> {
         }
     }
 
-    /// Takes the top entry: its reference and its distance.
+    /// Takes the top entry: its reference and its distance, with `ANY` −∞.
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<(u32, f32)> {
         self.top = self.top.checked_sub(1)?;
         debug_assert!(self.top < Self::CAPACITY);
         // SAFETY: by the invariant `top` was at most CAPACITY before, and all entries below it were
-        // written: it is raised only past such.
+        // written: it is raised only past such. A stack that is made anew is empty, and the type of one that is
+        // resumed is that of the one that was left: it has distances.
         unsafe {
             Some((
                 self.memory
@@ -144,11 +150,15 @@ impl<'a, const N: usize> Stack<'a, N> {
                     .as_flattened()
                     .get_unchecked(self.top)
                     .assume_init(),
-                self.memory
-                    .distances
-                    .as_flattened()
-                    .get_unchecked(self.top)
-                    .assume_init(),
+                if ANY {
+                    f32::NEG_INFINITY
+                } else {
+                    self.memory
+                        .distances
+                        .as_flattened()
+                        .get_unchecked(self.top)
+                        .assume_init()
+                },
             ))
         }
     }

@@ -101,12 +101,12 @@ fn next_leaf<const ANY: bool, const N: usize, const W: usize, B, L: PushChildren
     tree: &Tree<N, W, B>,
     ray: &BoxRay,
     t_max: f32,
-    stack: &mut Stack<'_, N>,
+    stack: &mut Stack<'_, N, ANY>,
     watch: &mut O,
 ) -> Option<ChildRef> {
     let boxes = BoxLanes::<L>::new(black_box(ray));
     while let Some((reference, distance)) = stack.pop() {
-        if !ANY && distance > t_max {
+        if distance > t_max {
             continue;
         }
         let mut reference = ChildRef(reference);
@@ -149,12 +149,12 @@ pub(crate) fn closest<
     watch: &mut O,
     tell: impl FnOnce(&Candidate, &RaySetup) -> H,
 ) -> Option<H> {
-    let ray = &ray.setup()?;
-    let boxes = BoxRay::new(ray, A::margin(ray));
+    let ray = &ray.setup::<T>()?;
+    let boxes = BoxRay::new::<T>(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut best = Best::none(ray.t_max);
     let mut memory = StackMemory::new();
-    let mut stack = Stack::<N>::new(&mut memory);
+    let mut stack = Stack::new(&mut memory);
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,
@@ -204,7 +204,7 @@ pub(super) fn follow<
     ray: &RaySetup,
     boxes: &BoxRay,
     prepared: &A::Ray<T>,
-    stack: &mut Stack<'_, N>,
+    stack: &mut Stack<'_, N, ANY>,
     best: &mut Best,
     watch: &mut O,
 ) {
@@ -354,13 +354,13 @@ pub(crate) fn any<
     ray: impl Asked,
     watch: &mut O,
 ) -> bool {
-    let Some(ray) = &ray.setup() else {
+    let Some(ray) = &ray.setup::<T>() else {
         return false;
     };
-    let boxes = BoxRay::new(ray, A::margin(ray));
+    let boxes = BoxRay::new::<T>(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut memory = StackMemory::new();
-    let mut stack = Stack::<N>::new(&mut memory);
+    let mut stack = Stack::new(&mut memory);
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,
@@ -402,10 +402,10 @@ pub(crate) fn all<
     ray: &RaySetup,
     mut visit: impl FnMut(Candidate),
 ) {
-    let boxes = BoxRay::new(ray, A::margin(ray));
+    let boxes = BoxRay::new::<T>(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut memory = StackMemory::new();
-    let mut stack = Stack::<N>::new(&mut memory);
+    let mut stack = Stack::new(&mut memory);
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,
@@ -457,11 +457,11 @@ pub(crate) fn visit<
     ray: &RaySetup,
     meet: &mut dyn FnMut(&Candidate) -> f32,
 ) {
-    let boxes = BoxRay::new(ray, A::margin(ray));
+    let boxes = BoxRay::new::<T>(ray, A::margin(ray));
     let prepared = A::prepare::<T>(ray);
     let mut t_max = ray.t_max;
     let mut memory = StackMemory::new();
-    let mut stack = Stack::<N>::new(&mut memory);
+    let mut stack = Stack::new(&mut memory);
     stack.push_if(
         u32::from(!tree.nodes.is_empty()),
         ChildRef::inner(0).0,

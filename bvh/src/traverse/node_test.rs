@@ -1,37 +1,37 @@
 //! One ray and all boxes of a node: slabs (Kay, Kajiya, *Ray Tracing Complex Scenes*, 1986) with one multiplication and
 //! addition per plane. Rounding is paid for by one pad per ray and axis, added once (see `triangle` for the bound).
 
-use super::setup::RaySetup;
+use super::{
+    setup::{RaySetup, in_lanes},
+    triangle::NODE_PAD,
+};
 use crate::{
     layout::node::Node,
     simd::{Lanes, splat_all},
 };
 
-/// What the box test needs of a ray.
+/// What the box test needs of a ray; the axes, and 0.
 pub(super) struct BoxRay {
     pub(super) octant: usize,
-    reciprocal: [f32; 3],
-    near_addend: [f32; 3],
-    far_addend: [f32; 3],
+    pub(super) reciprocal: [f32; 4],
+    /// What is added to the product of a near plane and a far plane of an axis with the reciprocal.
+    pub(super) near_addend: [f32; 4],
+    pub(super) far_addend: [f32; 4],
     t_min: f32,
-    near_plane: [usize; 3],
 }
 
 impl BoxRay {
     #[inline(always)]
-    pub(super) fn new(ray: &RaySetup, margin: [f32; 3]) -> Self {
-        let (mut near_addend, mut far_addend, mut near_plane) = ([0.0; 3], [0.0; 3], [0; 3]);
-        for axis in 0..3 {
-            [near_addend[axis], far_addend[axis]] = ray.addends(margin, axis);
-            near_plane[axis] = 2 * axis + (ray.octant() >> axis & 1);
-        }
+    pub(super) fn new<T: Lanes<4>>(ray: &RaySetup, margin: [f32; 3]) -> Self {
+        let reciprocal = in_lanes::<T>(ray.reciprocal);
+        let offset = in_lanes::<T>(ray.origin).mul(reciprocal);
+        let pad = in_lanes::<T>(margin).mul(T::splat(NODE_PAD));
         Self {
             octant: ray.octant(),
-            reciprocal: ray.reciprocal,
-            near_addend,
-            far_addend,
+            reciprocal: reciprocal.store(),
+            near_addend: offset.add(pad).xor_sign(T::splat(-1.0)).store(),
+            far_addend: pad.sub(offset).store(),
             t_min: ray.t_min,
-            near_plane,
         }
     }
 }
@@ -51,11 +51,13 @@ impl<L> BoxLanes<L> {
     where
         L: Lanes<N>,
     {
+        let ([rx, ry, rz, _], [nx, ny, nz, _]) = (ray.reciprocal, ray.near_addend);
+        let [fx, fy, fz, _] = ray.far_addend;
         Self {
-            reciprocal: splat_all(ray.reciprocal),
-            near_addend: splat_all(ray.near_addend),
-            far_addend: splat_all(ray.far_addend),
-            near_plane: ray.near_plane,
+            reciprocal: splat_all([rx, ry, rz]),
+            near_addend: splat_all([nx, ny, nz]),
+            far_addend: splat_all([fx, fy, fz]),
+            near_plane: [0, 1, 2].map(|axis| 2 * axis + (ray.octant >> axis & 1)),
             t_min: L::splat(ray.t_min),
         }
     }

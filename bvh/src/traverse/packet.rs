@@ -213,7 +213,7 @@ impl<const N: usize, P> Packets<N, P> {
         L: PushChildren<N>,
         T: Lanes<4>,
     {
-        let boxes = BoxRay::new(ray, A::margin(ray));
+        let boxes = BoxRay::new::<T>(ray, A::margin(ray));
         let mut best = Best::none(ray.t_max);
         let mut stack = Stack::new(&mut self.memory);
         stack.push_if(1, ChildRef::inner(0).0, ray.t_min);
@@ -249,19 +249,19 @@ impl<const N: usize, P> Packets<N, P> {
         let mut lanes = PacketRays::NONE;
         self.members.clear();
         for (place, ray) in rays.iter().enumerate() {
-            let Some(ray) = RaySetup::new(ray, scale) else {
+            let Some(ray) = RaySetup::in_lanes::<T>(ray, scale) else {
                 continue;
             };
             let lane = self.members.len();
             let margin = A::margin(&ray);
-            for axis in 0..3 {
-                let [near, far] = ray.addends(margin, axis);
+            let boxes = BoxRay::new::<T>(&ray, margin);
+            for (axis, margin) in margin.into_iter().enumerate() {
                 lanes.origin[axis][lane] = ray.origin[axis];
                 lanes.direction[axis][lane] = ray.direction[axis];
                 lanes.reciprocal[axis][lane] = ray.reciprocal[axis];
-                lanes.triangle_pad[axis][lane] = margin[axis] * TRIANGLE_PAD;
-                lanes.near_addend[axis][lane] = near;
-                lanes.far_addend[axis][lane] = far;
+                lanes.triangle_pad[axis][lane] = margin * TRIANGLE_PAD;
+                lanes.near_addend[axis][lane] = boxes.near_addend[axis];
+                lanes.far_addend[axis][lane] = boxes.far_addend[axis];
             }
             (lanes.t_min[lane], lanes.t_max[lane]) = (ray.t_min, ray.t_max);
             self.members.push(Member {
@@ -335,7 +335,7 @@ impl<const N: usize, P> Packets<N, P> {
                         }
                     }
                 } else {
-                    let boxes = BoxRay::new(ray, A::margin(ray));
+                    let boxes = BoxRay::new::<T>(ray, A::margin(ray));
                     let mut stack = Stack::new(&mut self.memory);
                     stack.push_if(1, reference.0, enter[lane]);
                     follow::<ANY, N, W, B, A, L, T, ()>(

@@ -5,25 +5,32 @@
 //! one has to ask.
 
 use glam::Vec3;
+use wide::f32x4;
 
-use super::triangle::NODE_PAD;
-use crate::ray::Ray;
+use crate::{ray::Ray, simd::Lanes};
 
 /// Bound S of the magnitude of scaled coordinates.
 pub(crate) const COORDINATE_BOUND: f32 = 2.0;
 
-/// Smaller components of a direction whose largest lies in 1/2..2 act as this in box tests.
+/// Directions whose largest component lies from the reciprocal of this to this are taken as they are: not far enough from
+/// 1 to bring what the tests make of them to the ends of f32.
+const LONGEST_AS_IT_IS: f32 = (1 << 16) as f32;
+
+/// Smaller components of such a direction act as this in box tests.
 const SMALLEST_COMPONENT: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// Origins farther away than this, in units of [`COORDINATE_BOUND`], hit nothing: the products of
 /// the box test would leave the range of f32.
 const FARTHEST_ORIGIN: f32 = (1u64 << 60) as f32;
 
+/// The bits of four lanes that all hold.
+const ALL_LANES: u32 = 0b1111;
+
 /// A ray in the scaled space of a tree, with all that does not change along it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RaySetup {
     pub(crate) origin: [f32; 3],
-    /// Scaled by a power of two so that the largest magnitude lies in 1/2..2.
+    /// Scaled by a power of two so that the largest magnitude lies in 1..2, unless it is about as large.
     pub(crate) direction: [f32; 3],
     pub(crate) reciprocal: [f32; 3],
     /// (S + |origin|) · |reciprocal|: errors of distances are multiples of it.
@@ -40,57 +47,51 @@ impl RaySetup {
     /// Prepares a ray for a tree whose coordinates are those of the caller times `scale`, a power
     /// of two. `None` if the ray can hit nothing: not finite, without direction, an empty
     /// interval, or an origin so far away that it has no precision left.
-    #[inline(always)]
     pub(crate) fn new(ray: &Ray, scale: f32) -> Option<Self> {
-        let origin = ray.origin * scale;
-        let largest = ray.direction.abs().max_element();
+        Self::in_lanes::<f32x4>(ray, scale)
+    }
+
+    /// As [`Self::new`], the axes in lanes: no other part of a traversal has so long a chain of operations.
+    #[inline(always)]
+    pub(crate) fn in_lanes<T: Lanes<4>>(ray: &Ray, scale: f32) -> Option<Self> {
+        let origin = in_lanes::<T>(ray.origin.to_array()).mul(T::splat(scale));
         let t_min = ray.t_min.max(0.0);
-        // Comparisons are written so that NaN fails them; max_element may drop a NaN, so the
-        // components are asked too.
-        let usable = largest > 0.0
-            && ray.direction.is_finite()
-            && origin.abs().cmple(Vec3::splat(FARTHEST_ORIGIN)).all()
-            && t_min <= ray.t_max
-            && !ray.t_min.is_nan();
+        // Comparisons are written so that NaN fails them.
+        let is_near = T::bits(origin.abs().le(T::splat(FARTHEST_ORIGIN))) == ALL_LANES;
+        let usable = is_near && t_min <= ray.t_max && !ray.t_min.is_nan();
         if !usable {
             return None;
         }
-        let [direction_scale, lift] = direction_scale(largest);
-        // Both are 1 or neither is.
-        let direction = if direction_scale == 1.0 {
-            ray.direction
+        let direction = in_lanes::<T>(ray.direction.to_array());
+        let length = direction.abs();
+        let is_short = T::bits(length.le(T::splat(LONGEST_AS_IT_IS))) == ALL_LANES;
+        let is_long = T::bits(T::splat(LONGEST_AS_IT_IS.recip()).le(length)) != 0;
+        let (direction, unscale, t_min, t_max) = if is_short && is_long {
+            let unscale = [1.0, scale.recip()];
+            (direction, unscale, t_min * scale, ray.t_max * scale)
         } else {
-            ray.direction * lift * direction_scale
+            let (direction, [direction_scale, lift]) = scaled_direction(ray.direction)?;
+            // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
+            let unscale = [direction_scale, lift / scale];
+            let direction = in_lanes::<T>(direction.to_array());
+            (
+                direction,
+                unscale,
+                scaled(t_min, unscale),
+                scaled(ray.t_max, unscale),
+            )
         };
-        let reciprocal = direction.to_array().map(|d| {
-            if d.abs() < SMALLEST_COMPONENT {
-                SMALLEST_COMPONENT.copysign(d)
-            } else {
-                d
-            }
-            .recip()
-        });
-        let margin = std::array::from_fn(|axis| {
-            (COORDINATE_BOUND + origin[axis].abs()) * reciprocal[axis].abs()
-        });
-        // t · direction · scale = t' · direction', so t' = t · scale / (lift · direction_scale).
-        let unscale = [direction_scale, lift / scale];
-        // As `scaled`: without what is 1, and with a product by a power of two for the quotient by its reciprocal.
-        let scaled_by = |t: f32| {
-            if direction_scale == 1.0 {
-                t * scale
-            } else {
-                scaled(t, unscale)
-            }
-        };
+        // Infinite where a component is 0 or nearly so, and then limited as that of any other small one.
+        let reciprocal = T::splat(1.0).div(direction);
+        let magnitude = reciprocal.abs().min(T::splat(SMALLEST_COMPONENT.recip()));
+        let margin = T::splat(COORDINATE_BOUND).add(origin.abs()).mul(magnitude);
         Some(Self {
-            origin: origin.to_array(),
-            direction: direction.to_array(),
-            reciprocal,
-            margin,
-            t_min: scaled_by(t_min),
-            t_max: scaled_by(ray.t_max),
-            // The signs are those of the reciprocals, but known before these are.
+            origin: of_lanes(origin),
+            direction: of_lanes(direction),
+            reciprocal: of_lanes(magnitude.xor_sign(direction)),
+            margin: of_lanes(margin),
+            t_min,
+            t_max,
             octant: ray.direction.is_negative_bitmask() as usize,
             unscale,
         })
@@ -100,14 +101,6 @@ impl RaySetup {
     #[inline(always)]
     pub(super) fn octant(&self) -> usize {
         self.octant
-    }
-
-    /// What the box test adds to the product of a near plane and a far plane of an axis with the reciprocal.
-    #[inline(always)]
-    pub(super) fn addends(&self, margin: [f32; 3], axis: usize) -> [f32; 2] {
-        let offset = -self.origin[axis] * self.reciprocal[axis];
-        let pad = margin[axis] * NODE_PAD;
-        [offset - pad, offset + pad]
     }
 
     /// A distance along the scaled ray in the caller's unit.
@@ -144,21 +137,44 @@ fn scaled(t: f32, unscale: [f32; 2]) -> f32 {
     t / unscale[1] / unscale[0]
 }
 
-/// Two powers of two whose product brings the largest component of a direction into 1/2..2, where
-/// most are already: no power of two changes a bit of what follows, but divisions take time.
+/// A direction multiplied by two powers of two so that its largest component lies in 1..2, which changes no bit of what
+/// follows. `None` if it is 0 or not finite.
 #[inline]
-fn direction_scale(largest: f32) -> [f32; 2] {
-    if (0.5..2.0).contains(&largest) {
-        [1.0, 1.0]
-    } else {
-        // A subnormal direction is lifted first: its power of two has no reciprocal in f32.
-        let lift = if largest < f32::MIN_POSITIVE {
-            (1u32 << 24) as f32
-        } else {
-            1.0
-        };
-        [power_of_two_below(largest * lift).recip(), lift]
+fn scaled_direction(direction: Vec3) -> Option<(Vec3, [f32; 2])> {
+    let largest = direction.abs().max_element();
+    // max_element may drop a NaN.
+    if !direction.is_finite() || largest == 0.0 {
+        return None;
     }
+    // At both ends of f32 powers of two have no reciprocal that is a normal number.
+    let lift = if largest < f32::MIN_POSITIVE {
+        (1u32 << 24) as f32
+    } else if largest >= 2.0 / f32::MIN_POSITIVE {
+        0.5
+    } else {
+        1.0
+    };
+    let scale = reciprocal_power_of_two(power_of_two_below(largest * lift));
+    Some((direction * lift * scale, [scale, lift]))
+}
+
+/// The axes, and 0.
+#[inline(always)]
+pub(super) fn in_lanes<T: Lanes<4>>([x, y, z]: [f32; 3]) -> T {
+    T::load(&[x, y, z, 0.0])
+}
+
+/// The axes of [`in_lanes`].
+#[inline(always)]
+pub(super) fn of_lanes<T: Lanes<4>>(lanes: T) -> [f32; 3] {
+    let [x, y, z, _] = lanes.store();
+    [x, y, z]
+}
+
+/// The reciprocal of a power of two from 2⁻¹²⁶ to 2¹²⁶, without a division.
+#[inline]
+fn reciprocal_power_of_two(power: f32) -> f32 {
+    f32::from_bits(2 * 1f32.to_bits() - power.to_bits())
 }
 
 /// The largest power of two that is not above a positive normal number.
@@ -170,12 +186,12 @@ pub(crate) fn power_of_two_below(value: f32) -> f32 {
 /// A ray that a kernel is asked about.
 pub(crate) trait Asked: Copy {
     /// As the kernel needs it; `None` if it can hit nothing.
-    fn setup(self) -> Option<RaySetup>;
+    fn setup<T: Lanes<4>>(self) -> Option<RaySetup>;
 }
 
 impl Asked for &RaySetup {
     #[inline(always)]
-    fn setup(self) -> Option<RaySetup> {
+    fn setup<T: Lanes<4>>(self) -> Option<RaySetup> {
         Some(*self)
     }
 }
@@ -191,7 +207,69 @@ pub(crate) struct Unprepared<'a> {
 
 impl Asked for Unprepared<'_> {
     #[inline(always)]
-    fn setup(self) -> Option<RaySetup> {
-        RaySetup::new(self.ray, self.scale)
+    fn setup<T: Lanes<4>>(self) -> Option<RaySetup> {
+        RaySetup::in_lanes::<T>(self.ray, self.scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// From the subnormal to the largest, of both signs, and 0.
+    fn component() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            8 => (-1f64..1.0, -149i32..128)
+                .prop_map(|(value, exponent)| (value * 2f64.powi(exponent)) as f32),
+            1 => prop::sample::select(vec![0.0, -0.0, 1.0, f32::MAX, -f32::from_bits(1)]),
+        ]
+    }
+
+    /// Of like size, or of any.
+    fn direction() -> impl Strategy<Value = Vec3> {
+        prop_oneof![
+            (prop::array::uniform3(-1f64..1.0), -149i32..128)
+                .prop_map(|(v, exponent)| Vec3::from(v.map(|x| (x * 2f64.powi(exponent)) as f32))),
+            prop::array::uniform3(component()).prop_map(Vec3::from),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn a_prepared_ray_is_the_ray(
+            origin in prop::array::uniform3(-1f32..1.0), direction in direction(), scale_exponent in -60i32..60,
+            t_min in 0f32..1.0, length in 0f32..1.0,
+        ) {
+            let scale = 2f32.powi(scale_exponent);
+            let ray = Ray::new(origin, direction).with_range(t_min, t_min + length);
+            let setup = RaySetup::new(&ray, scale);
+            prop_assert_eq!(setup.is_some(), direction != Vec3::ZERO);
+            prop_assume!(direction != Vec3::ZERO);
+            let setup = setup.unwrap();
+            let [given, prepared] = [direction, setup.direction.into()].map(|v: Vec3| v.as_dvec3());
+            let factor = prepared.abs().max_element() / given.abs().max_element();
+            prop_assert_eq!(factor.log2().fract(), 0.0);
+            prop_assert!((2f64.powi(-16)..=2f64.powi(16)).contains(&prepared.abs().max_element()));
+            for axis in 0..3 {
+                // Rounded where a component is so much smaller than the largest that it becomes subnormal.
+                prop_assert_eq!(setup.direction[axis], (given[axis] * factor) as f32);
+                let reciprocal = (1.0 / setup.direction[axis]).abs().min(2f32.powi(60));
+                prop_assert_eq!(setup.reciprocal[axis], reciprocal.copysign(direction[axis]));
+                prop_assert_eq!(setup.octant >> axis & 1 == 1, direction[axis].is_sign_negative());
+                prop_assert_eq!(setup.origin[axis], origin[axis] * scale);
+                prop_assert_eq!(setup.margin[axis], (2.0 + setup.origin[axis].abs()) * reciprocal);
+            }
+            for (t, prepared) in [(ray.t_min, setup.t_min), (ray.t_max, setup.t_max)] {
+                let exact = f64::from(t) * f64::from(scale) / factor;
+                prop_assert_eq!(prepared, exact as f32);
+                if exact > f64::from(f32::MIN_POSITIVE) && prepared.is_finite() {
+                    prop_assert_eq!(setup.unscaled(prepared), t);
+                }
+            }
+        }
     }
 }

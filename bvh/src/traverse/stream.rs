@@ -61,7 +61,7 @@ impl<'a> Waiting<'a> {
 
     /// The next ray that can hit anything, or the next rays if they go side by side.
     #[inline(always)]
-    fn next(&mut self, in_packets: bool) -> Option<Next<'a>> {
+    fn next<T: Lanes<4>>(&mut self, in_packets: bool) -> Option<Next<'a>> {
         while let Some(ray) = self.rays.get(self.next) {
             let place = self.next;
             if in_packets
@@ -73,7 +73,7 @@ impl<'a> Waiting<'a> {
                 return Some(Next::Packet(place, rays));
             }
             self.next += 1;
-            if let Some(setup) = RaySetup::new(ray, self.scale) {
+            if let Some(setup) = RaySetup::in_lanes::<T>(ray, self.scale) {
                 return Some(Next::Alone(place, setup));
             }
         }
@@ -103,7 +103,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         start(&mut waiting, ray.t_min);
         Self {
             place,
-            boxes: BoxLanes::new(&BoxRay::new(&ray, A::margin(&ray))),
+            boxes: BoxLanes::new(&BoxRay::new::<T>(&ray, A::margin(&ray))),
             prepared: A::prepare::<T>(&ray),
             best: Best::none(ray.t_max),
             waiting,
@@ -119,7 +119,7 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
         T: Lanes<4>,
     {
         self.place = place;
-        self.boxes = BoxLanes::new(&BoxRay::new(&ray, A::margin(&ray)));
+        self.boxes = BoxLanes::new(&BoxRay::new::<T>(&ray, A::margin(&ray)));
         self.prepared = A::prepare::<T>(&ray);
         self.best = Best::none(ray.t_max);
         start(&mut self.waiting, ray.t_min);
@@ -232,7 +232,7 @@ pub(crate) fn trace<
             }
         }
         // The place in turn is free.
-        match waiting.next(in_packets) {
+        match waiting.next::<T>(in_packets) {
             Some(Next::Packet(first, rays)) => {
                 packets.trace::<ANY, W, B, A, L, T, R>(tree, rays, scale, first, &mut tell)
             }
