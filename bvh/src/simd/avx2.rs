@@ -13,13 +13,13 @@ use std::arch::x86_64::{
     _mm256_cmp_ps, _mm256_div_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_loadu_si256,
     _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_permutevar8x32_epi32,
     _mm256_permutevar8x32_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
-    _mm256_slli_epi32, _mm256_sllv_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256,
-    _mm256_sub_ps, _mm256_xor_ps,
+    _mm256_slli_epi32, _mm256_srlv_epi32, _mm256_storeu_ps, _mm256_storeu_si256, _mm256_sub_ps,
+    _mm256_xor_ps,
 };
 
 use super::{
     Lanes, PushChildren, last_as_they_lie, last_child,
-    portable::{Half, Halves},
+    portable::{Half, Halves, MaskHalves},
     stack::Stack,
 };
 
@@ -192,11 +192,12 @@ lanes_by_intrinsics!(
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; 8],
         order: u64,
         stack: &mut Stack<'_, 8, ANY>,
     ) -> u32 {
+        let mask = Self::bits(entered);
         if ANY {
             push_references(stack, mask, children);
             return last_as_they_lie(mask, children);
@@ -210,7 +211,7 @@ lanes_by_intrinsics!(
                 _mm256_loadu_si256(children.as_ptr().cast::<__m256i>()),
             )
         };
-        let sorted = sorted_mask(mask, slots);
+        let sorted = sorted_mask(entered, slots);
         // SAFETY: as above.
         let (references, distances) = unsafe {
             let slots = _mm256_permutevar8x32_epi32(slots, closing(sorted));
@@ -228,18 +229,19 @@ impl Half for F32x8 {
     #[inline(always)]
     fn push_children_of_both<const ANY: bool>(
         both: Halves<Self>,
-        mask: u32,
+        entered: MaskHalves<Mask8>,
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
+        let mask = Halves::<Self>::bits(entered);
         if ANY {
             let (halves, _) = children.as_chunks();
             push_references(stack, mask & 255, &halves[0]);
             push_references(stack, mask >> 8, &halves[1]);
             return last_as_they_lie(mask, children);
         }
-        let mut entered = 0;
+        let mut entered_in_order = 0;
         for half in 0..2 {
             // SAFETY: AVX2 is available (file header). The loads read eight words each of the
             // sixteen of `children`.
@@ -249,8 +251,8 @@ impl Half for F32x8 {
                 let slots = _mm256_srlv_epi32(order, fields);
                 // Bit 3 of a slot, moved to the sign, tells which half it is in.
                 let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(slots));
-                let low = sorted_mask(mask & 255, slots);
-                let high = sorted_mask(mask >> 8, slots);
+                let low = sorted_mask(entered.0, slots);
+                let high = sorted_mask(entered.1, slots);
                 let is_high = _mm256_movemask_ps(upper) as u32;
                 let sorted = low & !is_high | high & is_high;
                 let close = closing(sorted);
@@ -276,23 +278,18 @@ impl Half for F32x8 {
                 )
             };
             push_eight(stack, references, distances, sorted.count_ones());
-            entered |= sorted << (8 * half);
+            entered_in_order |= sorted << (8 * half);
         }
-        last_child(entered, children, order)
+        last_child(entered_in_order, children, order)
     }
 }
 
-/// The bits of a mask of eight lanes in the order of `slots`, of which the lowest three bits count.
+/// The bits of a mask of eight lanes in the order of `slots`, of which the lowest three bits count. The mask as it is
+/// compared is sorted, since the way from its bits back to a vector is long.
 #[inline(always)]
-fn sorted_mask(mask: u32, slots: __m256i) -> u32 {
+fn sorted_mask(mask: Mask8, slots: __m256i) -> u32 {
     // SAFETY: AVX2 is available wherever a vector of this module exists (file header).
-    unsafe {
-        // Bit i of the mask moves to the sign of lane i, then to the place that `slots` gives.
-        let lane_bits = _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24);
-        let signs = _mm256_sllv_epi32(_mm256_set1_epi32(mask as i32), lane_bits);
-        let sorted = _mm256_permutevar8x32_epi32(signs, slots);
-        _mm256_movemask_ps(_mm256_castsi256_ps(sorted)) as u32
-    }
+    unsafe { _mm256_movemask_ps(_mm256_permutevar8x32_ps(mask.0, slots)) as u32 }
 }
 
 /// The permutation that closes the gaps of a mask of eight lanes.

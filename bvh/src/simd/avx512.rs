@@ -80,11 +80,12 @@ lanes_by_intrinsics!(
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; 4],
         order: u64,
         stack: &mut Stack<'_, 4, ANY>,
     ) -> u32 {
+        let mask = Self::bits(entered);
         let (reference, distance) = stack.top(4);
         // SAFETY: the instructions are available (file header). The load reads the four words of
         // `children`. By the invariant of the stack, N = 4 entries from the top on lie inside each
@@ -135,11 +136,12 @@ lanes_by_intrinsics!(
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; 8],
         order: u64,
         stack: &mut Stack<'_, 8, ANY>,
     ) -> u32 {
+        let mask = Self::bits(entered);
         let (reference, distance) = stack.top(8);
         // SAFETY: as with four lanes, for eight.
         unsafe {
@@ -190,11 +192,12 @@ lanes_by_intrinsics!(
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
+        let mask = Self::bits(entered);
         let (reference, distance) = stack.top(16);
         // SAFETY: as with four lanes, for sixteen.
         unsafe {

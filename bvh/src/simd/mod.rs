@@ -65,20 +65,19 @@ pub trait Lanes<const N: usize>: Copy {
 
 /// Lanes that hold what a ray finds at the children of a node.
 pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
-    /// Pushes onto a stack the children whose bit of `mask` is set, each with its distance from
-    /// `self`, in the order of the child numbers that `order` holds in fields of
+    /// Pushes onto a stack the children that are `entered`, each with its distance from `self`, in the order of the child numbers that `order` holds in fields of
     /// `log2(N)` bits, lowest field first; returns the last of them, which is on top then. To take
-    /// it from there would mean to wait for the store. With `ANY` they are pushed as they lie. Unspecified if `mask` is
-    /// 0.
+    /// it from there would mean to wait for the store. With `ANY` they are pushed as they lie. Unspecified if none
+    /// is.
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; N],
         order: u64,
         stack: &mut stack::Stack<'_, N, ANY>,
     ) -> u32 {
-        let distances = self.store();
+        let (mask, distances) = (Self::bits(entered), self.store());
         let bits = N.trailing_zeros();
         for k in 0..N as u32 {
             let slot = if ANY {

@@ -160,12 +160,12 @@ pub(crate) trait Half: PushChildren<8> {
     #[inline(always)]
     fn push_children_of_both<const ANY: bool>(
         both: Halves<Self>,
-        mask: u32,
+        entered: MaskHalves<Self::Mask>,
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
-        let distances = both.store();
+        let (mask, distances) = (Halves::<Self>::bits(entered), both.store());
         for k in 0..16 {
             let slot = if ANY {
                 k
@@ -182,7 +182,7 @@ impl Half for f32x8 {}
 
 /// A comparison of sixteen lanes in two halves.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MaskHalves<M>(M, M);
+pub(crate) struct MaskHalves<M>(pub M, pub M);
 
 impl<M: std::ops::BitAnd<Output = M>> std::ops::BitAnd for MaskHalves<M> {
     type Output = Self;
@@ -266,11 +266,11 @@ impl<L: Half> PushChildren<16> for Halves<L> {
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,
-        mask: u32,
+        entered: Self::Mask,
         children: &[u32; 16],
         order: u64,
         stack: &mut Stack<'_, 16, ANY>,
     ) -> u32 {
-        L::push_children_of_both(self, mask, children, order, stack)
+        L::push_children_of_both(self, entered, children, order, stack)
     }
 }

@@ -116,10 +116,11 @@ fn next_leaf<const ANY: bool, const N: usize, const W: usize, B, L: PushChildren
             }
             watch.node();
             let node = &tree.nodes[reference.0 as usize];
-            let (enter, mask) = boxes.test(node, t_max);
+            let (enter, entered) = boxes.test(node, t_max);
+            let mask = L::bits(entered);
             reference = if mask & mask.wrapping_sub(1) != 0 {
                 let order = order_of::<ANY, N, W>(node, ray.octant);
-                let nearest = enter.push_children(mask, &node.children, order, stack);
+                let nearest = enter.push_children(entered, &node.children, order, stack);
                 stack.drop_top();
                 ChildRef(nearest)
             } else if mask != 0 {

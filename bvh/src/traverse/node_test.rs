@@ -80,13 +80,13 @@ impl<L> BoxLanes<L> {
             .mul_add(self.reciprocal[axis], self.far_addend[axis])
     }
 
-    /// Distances at which the boxes of a node are entered, and one bit per box that is.
+    /// Distances at which the boxes of a node are entered, and which are.
     #[inline(always)]
     pub(super) fn test<const N: usize, const W: usize>(
         &self,
         node: &Node<N, W>,
         t_max: f32,
-    ) -> (L, u32)
+    ) -> (L, L::Mask)
     where
         L: Lanes<N>,
     {
@@ -94,6 +94,6 @@ impl<L> BoxLanes<L> {
         let enter = enter.max(self.near(node, 2).max(self.t_min));
         let leave = self.far(node, 0).min(self.far(node, 1));
         let leave = leave.min(self.far(node, 2).min(L::splat(t_max)));
-        (enter, L::bits(enter.le(leave)))
+        (enter, enter.le(leave))
     }
 }

@@ -156,10 +156,10 @@ impl<const N: usize, L: PushChildren<N>, P> Traveller<N, L, P> {
             }
         } else {
             let node = &tree.nodes[reference.0 as usize];
-            let (enter, mask) = self.boxes.test(node, self.best.t);
-            if mask != 0 {
+            let (enter, entered) = self.boxes.test(node, self.best.t);
+            if L::bits(entered) != 0 {
                 let order = order_of::<ANY, N, W>(node, self.ray.octant());
-                enter.push_children(mask, &node.children, order, &mut stack);
+                enter.push_children(entered, &node.children, order, &mut stack);
             }
         }
         if let Some(next) = stack.peek() {
