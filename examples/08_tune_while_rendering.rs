@@ -40,14 +40,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         seed: 1,
         isa: Isa::best(),
     };
-    let space = ParameterSpace::new(&strong, &[], SpaceAxes::Canonical)?;
+    let axes = SpaceAxes::Canonical;
+    let space = ParameterSpace::new(&strong, &[], axes)?;
     let search = || Box::new(GaussianProcess::new()) as _;
     let cancel = CancelToken::new();
     thread::scope(|scope| {
         let clock = WallClock::start();
         let run = Hybrid::new(&world, camera, settings, space, &strong, search, clock)?;
         let mut run = run
-            .with_starts(&portfolio(&strong, settings.metric))
+            .with_starts(&portfolio(&strong, settings.metric, axes))
             .with_overhead_limit(OVERHEAD)
             .with_background_builds(scope);
         for frame in 0..FRAMES {

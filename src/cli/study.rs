@@ -200,7 +200,7 @@ fn configurations(args: &RecordArgs) -> Result<Vec<(&'static str, BuildParams)>,
     ];
     let default = BuildParams::default();
     for metric in [Metric::Render, Metric::Total] {
-        for params in portfolio(&default, metric) {
+        for params in portfolio(&default, metric, SpaceAxes::Canonical) {
             if named.iter().all(|known| *known != ("portfolio", params)) {
                 named.push(("portfolio", params));
             }

@@ -284,7 +284,7 @@ fn tune(args: &TuneArgs, cancel: &CancelToken) -> Result<(), Failure> {
     }
     let world = &stage.world;
     let (camera, clock) = (stage.camera, WallClock::start());
-    let starts = tune::portfolio(&base, settings.metric);
+    let starts = tune::portfolio(&base, settings.metric, axes.into());
     let predicted = match (args.predict, &memory) {
         (Some(predict), Some(memory)) if args.policy == Policy::Paper => {
             predicted(predict, memory, &space, &stage, &settings)?

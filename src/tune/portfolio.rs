@@ -8,15 +8,15 @@
 
 use raywright_bvh::{BuildParams, Quality};
 
-use super::Metric;
+use super::{Metric, SpaceAxes};
 
 /// A tree that serves fewer frames than this is to be built in a hurry.
 const FEW_FRAMES: u32 = 10;
 
 /// Parameters to begin with, the most useful first: `base`, which is the default as a rule, and changes of it
-/// that pay in some scenes, by how many frames a tree serves.
+/// that pay in some scenes, by how many frames a tree serves, and which axes there are.
 #[must_use]
-pub fn portfolio(base: &BuildParams, metric: Metric) -> Vec<BuildParams> {
+pub fn portfolio(base: &BuildParams, metric: Metric, axes: SpaceAxes) -> Vec<BuildParams> {
     let with = |quality, branching_factor, leaf_sizes: [u32; 2], rotations| {
         let mut params = *base;
         params.quality = quality;
@@ -44,6 +44,11 @@ pub fn portfolio(base: &BuildParams, metric: Metric) -> Vec<BuildParams> {
             with(Quality::Morton, 8, [24, 32], 8),
             wide,
         ]
+    } else if axes == SpaceAxes::Eleven {
+        // Of Embree's qualities there is but one above the default.
+        let mut splits = *base;
+        splits.quality = Quality::SpatialSplits;
+        vec![*base, splits]
     } else {
         // Younger than the recordings.
         let costs = BuildParams::least_cost(16);
@@ -72,12 +77,15 @@ mod tests {
 
     #[test]
     fn all_are_valid_and_different() {
-        for metric in [Metric::Render, Metric::Total] {
-            let all = portfolio(&BuildParams::default(), metric);
-            assert_eq!(all[0], BuildParams::default());
-            for (index, params) in all.iter().enumerate() {
-                assert_eq!(params.validate(), Ok(()));
-                assert!(!all[..index].contains(params));
+        for axes in [SpaceAxes::Canonical, SpaceAxes::Eleven] {
+            for metric in [Metric::Render, Metric::Total] {
+                let all = portfolio(&BuildParams::default(), metric, axes);
+                assert_eq!(all[0], BuildParams::default());
+                assert!(all.len() >= 2);
+                for (index, params) in all.iter().enumerate() {
+                    assert_eq!(params.validate(), Ok(()));
+                    assert!(!all[..index].contains(params));
+                }
             }
         }
     }

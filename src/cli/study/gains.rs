@@ -188,7 +188,7 @@ fn one<'a>(
     };
     let mut twin = run()?.frozen();
     let mut hybrid = run()?
-        .with_starts(&portfolio(&strong, metric))
+        .with_starts(&portfolio(&strong, metric, axes.axes()))
         .with_overhead_limit(args.overhead);
     if args.background {
         hybrid = hybrid.with_background_builds(scope);

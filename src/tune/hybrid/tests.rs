@@ -93,7 +93,7 @@ fn hybrid<'p, C: Clock>(
         clock,
     );
     run.unwrap()
-        .with_starts(&portfolio(&base, metric))
+        .with_starts(&portfolio(&base, metric, SpaceAxes::Canonical))
         .with_overhead_limit(f64::INFINITY)
 }
 
@@ -101,13 +101,16 @@ fn hybrid<'p, C: Clock>(
 fn starts_of_a_kind_that_the_space_lacks_are_left_out() {
     let (place, base) = (place("interior"), BuildParams::default());
     let space = ParameterSpace::new(&base, &[], SpaceAxes::Eleven).unwrap();
-    let starts = portfolio(&base, Metric::Total);
+    let starts = portfolio(&base, Metric::Total, SpaceAxes::Canonical);
     let mut run = hybrid(&place, Metric::Total, &base, WallClock::start());
     run.space = space;
-    let kept = run.with_starts(&starts).starts;
+    run = run.with_starts(&starts);
+    let kept = &run.starts;
     assert!(kept.len() >= 2 && kept.len() < starts.len());
     assert!(kept.iter().all(|kept| starts.contains(kept)));
     assert!(kept.iter().all(|kept| kept.branching_factor <= 8));
+    let starts = portfolio(&base, Metric::Render, SpaceAxes::Eleven);
+    assert_eq!(run.with_starts(&starts).starts, starts);
 }
 
 /// The same frames by one tree.
