@@ -300,7 +300,7 @@ fn closing(mask: u32) -> __m256i {
     unsafe { _mm256_loadu_si256(row.as_ptr().cast::<__m256i>()) }
 }
 
-/// Pushes those of eight references that `mask` has bits of, as they lie.
+/// Pushes those of eight references that `mask` has bits of, as they lie, onto a stack of references alone: `ANY` is true.
 #[inline(always)]
 fn push_references<const N: usize, const ANY: bool>(
     stack: &mut Stack<'_, N, ANY>,
@@ -313,8 +313,9 @@ fn push_references<const N: usize, const ANY: bool>(
             "a push may write as many entries as a node has children"
         )
     };
+    debug_assert!(ANY);
     let (reference, _) = stack.top(8);
-    // SAFETY: as in `push_eight`, of references alone; the load reads the eight of them.
+    // SAFETY: as in `push_eight`; with `ANY` (both callers ask for it) no distance is counted in; the load reads the eight of them.
     unsafe {
         let words = _mm256_loadu_si256(references.as_ptr().cast::<__m256i>());
         let words = _mm256_permutevar8x32_epi32(words, closing(mask));

@@ -65,10 +65,10 @@ pub trait Lanes<const N: usize>: Copy {
 
 /// Lanes that hold what a ray finds at the children of a node.
 pub(crate) trait PushChildren<const N: usize>: Lanes<N> {
-    /// Pushes onto a stack the children that are `entered`, each with its distance from `self`, in the order of the child numbers that `order` holds in fields of
-    /// `log2(N)` bits, lowest field first; returns the last of them, which is on top then. To take
-    /// it from there would mean to wait for the store. With `ANY` they are pushed as they lie. Unspecified if none
-    /// is.
+    /// Pushes onto a stack the children that are `entered`, each with its distance from `self`, in the order of the child
+    /// numbers that `order` holds in fields of `log2(N)` bits, lowest field first; returns the last of them, which is on
+    /// top then. To take it from there would mean to wait for the store. With `ANY` references alone are pushed, as they
+    /// lie, whatever `order` is. Unspecified if none is entered.
     #[inline(always)]
     fn push_children<const ANY: bool>(
         self,

@@ -10,10 +10,10 @@ use crate::{
     simd::{Lanes, splat_all},
 };
 
-/// What the box test needs of a ray; the axes, and 0.
+/// What the box test needs of a ray, by axis; the fourth is 0.
 pub(super) struct BoxRay {
     pub(super) octant: usize,
-    pub(super) reciprocal: [f32; 4],
+    reciprocal: [f32; 4],
     /// What is added to the product of a near plane and a far plane of an axis with the reciprocal.
     pub(super) near_addend: [f32; 4],
     pub(super) far_addend: [f32; 4],

@@ -24,7 +24,8 @@
 //! margin here is M_x + M_z, of which [`TRIANGLE_PAD`] takes 8u. The distance to the plane is clamped
 //! to the interval of which this shows that it is not empty. (A component of the direction
 //! below 2⁻⁶⁰ acts as 2⁻⁶⁰ in box tests; what that moves, t·2⁻⁵⁹, is below the pad's 16u for
-//! origins nearer than 2³⁶ sizes of the scene.)
+//! origins nearer than 2³⁶ sizes of the scene, 2²⁰ where the direction's largest component is 2⁻¹⁶, the shortest that is
+//! taken as it is.)
 
 use glam::DVec3;
 

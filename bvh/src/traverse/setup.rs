@@ -166,7 +166,7 @@ pub(super) fn in_lanes<T: Lanes<4>>([x, y, z]: [f32; 3]) -> T {
 
 /// The axes of [`in_lanes`].
 #[inline(always)]
-pub(super) fn of_lanes<T: Lanes<4>>(lanes: T) -> [f32; 3] {
+fn of_lanes<T: Lanes<4>>(lanes: T) -> [f32; 3] {
     let [x, y, z, _] = lanes.store();
     [x, y, z]
 }
